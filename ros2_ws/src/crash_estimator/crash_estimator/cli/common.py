@@ -1,0 +1,58 @@
+"""What the commands share: exit statuses, settings on the command line, JSON without NaN."""
+
+import json
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crash_replay.recording import RecordingError
+
+from ..core.structure import ModelError
+
+
+def guarded(command: Callable[[], None]) -> int:
+    """Run a command -> exit status: 0 done, 1 with one line on standard error where data or model are at fault."""
+    try:
+        command()
+    except (RecordingError, ModelError, OSError) as error:
+        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+def parse_settings(pairs: list[str]) -> dict[str, float | int | bool]:
+    """["forgetting=0.98", "m=5"] -> {"forgetting": 0.98, "m": 5}."""
+    settings = {}
+    for pair in pairs:
+        name, equals, text = pair.partition("=")
+        try:
+            if not equals:
+                raise ValueError
+            value: float | int | bool = text == "true" if text in ("true", "false") else float(text)
+        except ValueError:
+            raise ModelError(f"a setting is written NAME=NUMBER, such as forgetting=0.98, got {pair!r}") from None
+        settings[name.strip()] = int(value) if isinstance(value, float) and text.strip().lstrip("+-").isdigit() else value
+    return settings
+
+
+def write_json(path: str | Path, content: Any) -> None:
+    """Strict JSON: arrays become lists, NaN and infinity become null."""
+    Path(path).write_text(json.dumps(_plain(content), indent=1, allow_nan=False) + "\n")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return [_plain(item) for item in value.tolist()]
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

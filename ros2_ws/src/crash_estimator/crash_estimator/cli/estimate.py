@@ -1,0 +1,98 @@
+"""`estimate BAG --model M --method mrls`: fold a recording through an estimator and print what it found."""
+
+import argparse
+import sys
+
+import numpy as np
+
+from crash_replay.bag import read_bag
+from crash_replay.recording import Recording
+
+from ..core.errors import EquationError, equation_errors
+from ..core.estimate import Description, Estimate, ParameterStatus
+from ..core.fold import run
+from ..core.methods import METHODS, make_estimator
+from ..model_file import load_model, ready_models
+from ..tables import error_table, parameter_table
+from .common import guarded, parse_settings, write_json
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="estimate", description=__doc__)
+    parser.add_argument("bag", metavar="BAG", help="a recording: rosbag2 folder or .mcap file")
+    parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
+    parser.add_argument("--method", default="constrained_kalman", choices=METHODS)
+    parser.add_argument("--set", nargs="*", default=[], metavar="NAME=VALUE", help="settings of the method")
+    parser.add_argument("--json", metavar="FILE", help="write everything that was found")
+    arguments = parser.parse_args()
+    sys.exit(guarded(lambda: estimate(arguments)))
+
+
+def estimate(arguments: argparse.Namespace) -> None:
+    structure = load_model(arguments.model)
+    recording = read_bag(arguments.bag)
+    settings = parse_settings(arguments.set)
+    estimator = make_estimator(structure, recording.test, arguments.method, **settings)
+    estimates = run(estimator, recording.samples())
+    description, errors = estimator.description, equation_errors(estimator.description, estimates)
+    print(f"{recording.test.id}: {len(recording)} samples, model {description.model}, method {description.method}")
+    print()
+    print(parameter_table(description, estimates))
+    print()
+    print(error_table(errors))
+    if arguments.json:
+        write_json(arguments.json, as_json(recording, description, estimates, errors))
+
+
+def as_json(
+    recording: Recording, description: Description, estimates: list[Estimate], errors: list[EquationError]
+) -> dict:
+    """Final values, the errors per equation, every event and every series; units are in `units`."""
+    last = estimates[-1]
+
+    def series(field: str, names: tuple[str, ...]) -> dict:
+        values = np.array([getattr(estimate, field) for estimate in estimates])
+        return {name: values[:, k] for k, name in enumerate(names)}
+
+    return {
+        "test": recording.test.id,
+        "model": description.model,
+        "method": description.method,
+        "samples": len(recording),
+        "units": dict(zip(description.parameters, description.parameter_units))
+        | dict(zip(description.equations, description.equation_units)),
+        "parameters": {
+            name: {
+                "value": float(last.parameters[k]),
+                "std": float(last.std[k]),
+                "unit": description.parameter_units[k],
+                "status": ParameterStatus(last.status[k]).name.lower(),
+            }
+            for k, name in enumerate(description.parameters)
+        },
+        "equations": {row.equation: row._asdict() for row in errors},
+        "events": [
+            {"number": estimate.number, "time": estimate.time_ns * 1e-9} | event._asdict()
+            for estimate in estimates
+            for event in estimate.events
+        ],
+        "series": {
+            "time": recording.time,
+            "parameters": series("parameters", description.parameters),
+            "std": series("std", description.parameters),
+            "status": series("status", description.parameters),
+            "measured": series("measured", description.equations),
+            "predicted": series("predicted", description.equations),
+            "innovation": series("innovation", description.equations),
+            "residual": series("residual", description.equations),
+            "crush": series("crush", description.elements),
+            "rate": series("rate", description.elements),
+            "force": series("force", description.elements),
+            "force_std": series("force_std", description.elements),
+            "state": series("state", description.elements),
+        },
+    }
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,148 @@
+"""One estimator: motion -> contact -> regression -> method, sample by sample.
+
+`step` is pure: it takes the state after the last sample and returns a new one, so that the same fold runs
+in a node, offline, and again from any sample whose state was kept.
+"""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from crash_replay.recording import Sample, Test
+
+from .contact import Contact, ContactState
+from .estimate import Description, Estimate, Event
+from .estimators.update import Update
+from .kinematics import Kinematics, KinematicState, Motion
+from .regression import Forces, Regression, Regressor
+from .structure import Structure
+
+
+class Method(Protocol):
+    """A recursive estimation method: frozen settings, `init`, `update`."""
+
+    def init(self, equations: int): ...
+
+    def update(self, state, regression: Regression) -> tuple[object, Update]: ...
+
+
+class State(NamedTuple):
+    """Everything an estimator knows after a sample."""
+
+    kinematics: KinematicState
+    contact: ContactState
+    method: object
+    update: Update  # the last one
+    dropped: tuple[int, ...]  # equations without a valid measurement at the last sample
+
+
+class Estimator:
+    """Settings: a structure fitted to a test's channels, and a method."""
+
+    def __init__(self, structure: Structure, test: Test, method: Method, method_name: str):
+        self.kinematics = Kinematics(structure, test)
+        self.contact = Contact(structure)
+        self.regressor = Regressor(structure)
+        self.structure = structure
+        self.method = method
+        parameters = structure.parameters
+        self.description = Description(
+            model=structure.name,
+            method=method_name,
+            parameters=tuple(p.name for p in parameters),
+            parameter_units=tuple(p.unit for p in parameters),
+            equations=tuple(structure.bodies[k].name for k in structure.equations),
+            equation_units=structure.equation_units,
+            elements=tuple(e.name for e in structure.elements),
+            between=tuple(e.between for e in structure.elements),
+            bodies=tuple(b.name for b in structure.bodies),
+            masses=tuple(b.mass or float("nan") for b in structure.bodies),
+        )
+
+    def init(self) -> State:
+        p, q = len(self.description.parameters), len(self.description.equations)
+        settings = self.method.settings
+        start = Update(settings.initial, np.diag(settings.std**2), np.zeros((q, q)), np.zeros(p, dtype=bool))
+        return State(self.kinematics.init(), self.contact.init(), self.method.init(q), start, ())
+
+    def step(self, state: State, sample: Sample) -> tuple[State, Estimate]:
+        """Fold one sample in; `state` is left as it was."""
+        kinematics, motion = self.kinematics.step(state.kinematics, sample)
+        stiffness = state.update.theta[self.regressor.stiffness_index]
+        contact, law, events = self.contact.step(state.contact, motion, stiffness)
+        regression, forces = self.regressor.make(motion, law)
+        method, update = state.method, state.update
+        if motion.dt > 0.0 and self._excited(regression):
+            method, update = self.method.update(method, regression)
+            events += update.events + self._clamp_events(state.update.clamped, update)
+        else:
+            noise = np.diag(np.nan_to_num(regression.noise))
+            update = update._replace(clamped=np.zeros_like(update.clamped), innovation_covariance=noise, events=())
+        dropped, drop_events = self._dropouts(state.dropped, motion)
+        status = self.regressor.status(law, update.clamped)
+        estimate = self._estimate(
+            sample, motion, contact, regression, state.update.theta, update, forces, status, events + drop_events
+        )
+        return State(kinematics, contact, method, update, dropped), estimate
+
+    @staticmethod
+    def _excited(regression: Regression) -> bool:
+        measured = ~np.isnan(regression.measured)
+        return bool((regression.gradient[measured] != 0.0).any())
+
+    def _clamp_events(self, before: np.ndarray, update: Update) -> tuple[Event, ...]:
+        fresh = np.flatnonzero(update.clamped & ~before)
+        names = self.description.parameters
+        return tuple(
+            Event("clamped", names[k], float(update.theta[k]), f"{names[k]}: held at its bound {update.theta[k]:g}")
+            for k in fresh
+        )
+
+    def _dropouts(self, before: tuple[int, ...], motion: Motion) -> tuple[tuple[int, ...], tuple[Event, ...]]:
+        now = tuple(np.flatnonzero(np.isnan(motion.measured)).tolist())
+        names = self.description.equations
+        return now, tuple(
+            Event("dropout", names[k], motion.time, f"{names[k]}: no valid measurement, its equation is left out")
+            for k in now
+            if k not in before
+        )
+
+    def _estimate(
+        self,
+        sample: Sample,
+        motion: Motion,
+        contact: ContactState,
+        regression: Regression,
+        theta_before: np.ndarray,
+        update: Update,
+        forces: Forces,
+        status: np.ndarray,
+        events: tuple[Event, ...],
+    ) -> Estimate:
+        predicted = regression.known + regression.gradient @ update.theta
+        before = regression.known + regression.gradient @ theta_before
+        # the part of the innovation that the update did not explain: R S^-1 R for an optimal gain, at most S
+        spread = regression.gradient @ update.covariance @ regression.gradient.T
+        residual_variance = np.maximum(np.diagonal(update.innovation_covariance) - np.diagonal(spread), 0.0)
+        return Estimate(
+            number=sample.number,
+            time_ns=sample.time_ns,
+            parameters=update.theta,
+            covariance=update.covariance,
+            status=status,
+            measured=motion.measured,
+            predicted=predicted,
+            innovation=motion.measured - before,
+            innovation_covariance=update.innovation_covariance,
+            residual=motion.measured - predicted,
+            residual_std=np.sqrt(residual_variance),
+            crush=motion.crush,
+            rate=motion.rate,
+            force=forces.per_unit @ update.theta + forces.shift,
+            force_std=np.sqrt(np.einsum("ep,pr,er->e", forces.per_unit, update.covariance, forces.per_unit)),
+            state=contact.state,
+            displacement=motion.displacement,
+            velocity=motion.velocity,
+            acceleration=motion.acceleration,
+            events=events,
+        )

@@ -1,0 +1,65 @@
+"""What the estimation methods have in common: settings of theta, the result of an update, bounds."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ..estimate import Event
+from ..structure import Structure
+
+
+class Theta(NamedTuple):
+    """The parameter vector's settings, all (p,)."""
+
+    names: tuple[str, ...]
+    initial: np.ndarray
+    std: np.ndarray  # of the initial value; 0 for known parameters
+    lower: np.ndarray
+    upper: np.ndarray
+    scale: np.ndarray  # order of magnitude
+
+
+class Update(NamedTuple):
+    """What a method says after one sample: p parameters, q equations."""
+
+    theta: np.ndarray  # (p,)
+    covariance: np.ndarray  # (p, p)
+    innovation_covariance: np.ndarray  # (q, q)
+    clamped: np.ndarray  # (p,) held at a bound in this step
+    events: tuple[Event, ...] = ()
+
+
+def theta_settings(structure: Structure) -> Theta:
+    """A stated standard deviation is kept; otherwise the initial value may be wrong by its order of magnitude."""
+    parameters = structure.parameters
+    stds = [
+        0.0 if not p.coefficient.estimated else p.scale if p.coefficient.std is None else p.coefficient.std
+        for p in parameters
+    ]
+    return Theta(
+        tuple(p.name for p in parameters),
+        np.array([p.coefficient.value for p in parameters], dtype=float),
+        np.array(stds, dtype=float),
+        np.array([p.coefficient.min for p in parameters], dtype=float),
+        np.array([p.coefficient.max for p in parameters], dtype=float),
+        np.array([p.scale for p in parameters], dtype=float),
+    )
+
+
+def within_bounds(
+    solve: Callable[[np.ndarray, np.ndarray], np.ndarray], theta: np.ndarray, active: np.ndarray, settings: Theta
+) -> tuple[np.ndarray, np.ndarray]:
+    """Solve for the active parameters; declare any that leaves its bounds known there and solve again (figure 6.6).
+
+    solve(theta, active) -> the updated theta, with the inactive ones as given.
+    Returns the updated theta and (p,) which of its parameters are held at a bound.
+    """
+    clamped = np.zeros(len(theta), dtype=bool)
+    while True:
+        updated = solve(theta, active & ~clamped)
+        outside = active & ~clamped & ((updated < settings.lower) | (updated > settings.upper))
+        if not outside.any():
+            return updated, clamped
+        theta = np.where(outside, np.clip(updated, settings.lower, settings.upper), theta)
+        clamped = clamped | outside

@@ -1,0 +1,166 @@
+"""Motion of the bodies and crush of the elements, integrated sample by sample from the measured accelerations.
+
+    v(t) = v0 + integral of a,    x(t) = x0 + integral of v
+
+from a stated initial velocity and displacement, after removing each channel's pre-impact mean. Between
+two samples the acceleration is taken as a straight line: v += dt (a0 + a1)/2, x += v0 dt + dt^2 (2 a0 + a1)/6.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from crash_replay.recording import Sample, Test
+
+from .structure import ModelError, Structure
+
+RATE_SMOOTHING = 3e-4
+"""s: time constant of the rate of crush where only the crush is measured (a difference alone is mostly noise)."""
+
+
+class Motion(NamedTuple):
+    """What moves at one sample: b bodies, e elements, q equations."""
+
+    time: float  # s since the impact
+    dt: float  # s since the last sample after the impact; 0 before it
+    displacement: np.ndarray  # (b,) m
+    velocity: np.ndarray  # (b,) m/s
+    acceleration: np.ndarray  # (b,) m/s^2, NaN where not measured
+    crush: np.ndarray  # (e,) m
+    rate: np.ndarray  # (e,) m/s
+    measured: np.ndarray  # (q,) left-hand side of each equation, NaN where not measured
+    noise: np.ndarray  # (q,) variance of it before the impact: the sensors' noise; NaN where not known
+
+
+class KinematicState(NamedTuple):
+    time_ns: int  # of the last sample after the impact; -1 before
+    count: np.ndarray  # (channels,) pre-impact samples
+    offset: np.ndarray  # (channels,) their mean: the zero offset
+    squares: np.ndarray  # (q,) sum of squared deviations of each equation's measurement before the impact
+    displacement: np.ndarray  # (b,)
+    velocity: np.ndarray  # (b,)
+    acceleration: np.ndarray  # (b,) the last valid one
+    crush: np.ndarray  # (e,) of the last sample
+    rate: np.ndarray  # (e,)
+
+
+class Kinematics:
+    """Settings: which channel moves which body. `init` and `step` fold samples into motion."""
+
+    def __init__(self, structure: Structure, test: Test):
+        structure.check_channels(test)
+        bodies, elements = structure.bodies, structure.elements
+        self.structure = structure
+        self.channel_count = len(test.channels)
+        self.offsets = np.array([channel.quantity in ("acceleration", "force") for channel in test.channels])
+        self.accelerometers = [(k, [test.index(name) for name in b.acceleration]) for k, b in enumerate(bodies)]
+        self.crush_channels = [(k, test.index(e.displacement)) for k, e in enumerate(elements) if e.displacement]
+        self.rate_channels = [(k, test.index(e.velocity)) for k, e in enumerate(elements) if e.velocity]
+        self.derived_rates = [k for k, e in enumerate(elements) if e.displacement and not e.velocity]
+        self.force_channels = [
+            (row, test.index(bodies[k].force)) for row, k in enumerate(structure.equations) if bodies[k].fixed
+        ]
+        self.balances = [(row, k) for row, k in enumerate(structure.equations) if bodies[k].free]
+        self.moving = np.array([bool(body.acceleration) for body in bodies])
+        self.initial_velocity = self._initial(test, test.initial_velocity)
+        self.initial_displacement = self._initial(test, test.initial_displacement)
+
+    def _initial(self, test: Test, stated: Mapping[str, float]) -> np.ndarray:
+        """(b,) stated for the body, or for the one that the test says its sensor sits on (a cab on a car).
+
+        A fixed body rests at 0, whatever the test says of its name.
+        """
+        values = np.zeros(len(self.structure.bodies))
+        for k, body in enumerate(self.structure.bodies):
+            carriers = [test.channels[test.index(name)].body for name in body.acceleration]
+            known = [name for name in (body.name, *carriers) if name in stated]
+            values[k] = stated[known[0]] if known and not body.fixed else 0.0
+        if not np.isfinite(values).all():
+            raise ModelError("an initial velocity or displacement of the test is not a finite number")
+        return values
+
+    def init(self) -> KinematicState:
+        channels, bodies = np.zeros(self.channel_count), np.zeros(len(self.structure.bodies))
+        elements = np.zeros(len(self.structure.elements))
+        squares = np.zeros(len(self.structure.equations))
+        return KinematicState(
+            -1, channels, channels, squares, self.initial_displacement, self.initial_velocity, bodies, elements, elements
+        )
+
+    def step(self, state: KinematicState, sample: Sample) -> tuple[KinematicState, Motion]:
+        """Fold one sample in; `state` is left as it was."""
+        before_impact = sample.time_ns < 0
+        if before_impact:
+            state = self._learn_offset(state, sample.values)
+        values = np.where(self.offsets, sample.values - state.offset, sample.values)
+        acceleration = self._body_accelerations(values)
+        if before_impact:
+            dt, displacement, velocity = 0.0, self.initial_displacement + self.initial_velocity * sample.time, state.velocity
+            now = state.acceleration
+        else:
+            dt = (sample.time_ns - max(state.time_ns, 0)) * 1e-9
+            now = np.where(np.isnan(acceleration), state.acceleration, acceleration)  # bridges a dropout
+            last = now if state.time_ns < 0 else state.acceleration
+            displacement = state.displacement + dt * state.velocity + dt * dt * (2.0 * last + now) / 6.0
+            velocity = state.velocity + 0.5 * dt * (last + now)
+        crush, rate = self._crush(state, values, displacement, velocity, dt)
+        motion = Motion(
+            sample.time, dt, displacement, velocity, acceleration, crush, rate,
+            self._measured(values, acceleration), self._noise(state),
+        )  # fmt: skip
+        if before_impact:
+            return self._learn_noise(state, motion.measured)._replace(crush=crush, rate=rate), motion
+        return (
+            state._replace(
+                time_ns=sample.time_ns, displacement=displacement, velocity=velocity, acceleration=now, crush=crush, rate=rate
+            ),
+            motion,
+        )
+
+    def _body_accelerations(self, values: np.ndarray) -> np.ndarray:
+        """(b,) mean of each body's valid channels; 0 for a body without channels, NaN where all have dropped out."""
+        result = np.zeros(len(self.accelerometers))
+        for body, columns in self.accelerometers:
+            if len(columns) == 1:
+                result[body] = values[columns[0]]
+            elif columns:
+                valid = [values[c] for c in columns if values[c] == values[c]]
+                result[body] = sum(valid) / len(valid) if valid else np.nan
+        return result
+
+    def _crush(self, state, values, displacement, velocity, dt) -> tuple[np.ndarray, np.ndarray]:
+        """(e,) crush and rate: from the bodies' motion, or from measured channels where the model names them."""
+        ends = self.structure.ends
+        crush = displacement[ends[:, 0]] - displacement[ends[:, 1]]
+        rate = velocity[ends[:, 0]] - velocity[ends[:, 1]]
+        for element, column in self.crush_channels:
+            crush[element] = values[column] if values[column] == values[column] else state.crush[element]
+        for element in self.derived_rates:
+            slope = (crush[element] - state.crush[element]) / dt if dt > 0 else 0.0
+            rate[element] = state.rate[element] + (slope - state.rate[element]) * dt / (dt + RATE_SMOOTHING)
+        for element, column in self.rate_channels:
+            rate[element] = values[column] if values[column] == values[column] else state.rate[element]
+        return crush, rate
+
+    def _measured(self, values: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+        measured = np.empty(len(self.structure.equations))
+        for row, body in self.balances:
+            measured[row] = acceleration[body]
+        for row, column in self.force_channels:
+            measured[row] = values[column]
+        return measured
+
+    def _learn_offset(self, state: KinematicState, values: np.ndarray) -> KinematicState:
+        valid = ~np.isnan(values)
+        count = state.count + valid
+        change = np.where(valid, values - state.offset, 0.0) / np.maximum(count, 1.0)
+        return state._replace(count=count, offset=state.offset + change)
+
+    def _learn_noise(self, state: KinematicState, measured: np.ndarray) -> KinematicState:
+        """Deviations from the running mean; the first samples' mean is poor, but their share fades as 1/n."""
+        return state._replace(squares=state.squares + np.nan_to_num(measured) ** 2)
+
+    def _noise(self, state: KinematicState) -> np.ndarray:
+        count = state.count.max(initial=0.0)
+        return state.squares / count if count >= 20 else np.full_like(state.squares, np.nan)

@@ -1,0 +1,176 @@
+"""A lumped model: bodies along one axis and the elements between them (thesis 4.2, equation 4.1).
+
+x is positive in the direction the striking body travels. An element between bodies a and b has
+crush X = x_a - x_b (compression positive), rate of crush V = dX/dt and force F = K X + C V
+(compression positive), which pushes a back and b forward:
+
+    M_k a_k = sum over elements of delta_k F + e_k,    delta = -1 for a, +1 for b
+
+A free body gives one equation, divided by its mass so that measured, predicted and residual are in
+the accelerometer's m/s^2; a fixed body with a measured force gives another, in N, the force on it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cached_property
+
+import numpy as np
+
+from crash_replay.recording import Test
+
+CONTACT_FREQUENCY = 30.0
+"""rad/s: a quarter period of 50 ms, a crash's time scale; with a mass it gives a stiffness's order of magnitude."""
+
+
+class ModelError(ValueError):
+    """The model is at fault, or does not fit the test; the message is one readable line."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A lumped mass, a driven motion or a fixed wall."""
+
+    name: str
+    mass: float | None = None  # kg; only a free body needs one
+    acceleration: tuple[str, ...] = ()  # channels; their mean is the body's acceleration
+    driven: bool = False  # motion taken from its channels (forced displacement, thesis 6.4.1)
+    fixed: bool = False
+    force: str | None = None  # channel of the measured force on a fixed body
+    noise: float | None = None  # standard deviation of its equation's error, m/s^2 or N; None: found from the data
+
+    @property
+    def free(self) -> bool:
+        return not (self.driven or self.fixed)
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A stiffness (N/m) or damping (N s/m): known, or estimated from an initial value."""
+
+    value: float = 0.0  # the known value, or the initial one
+    estimated: bool = False
+    std: float | None = None  # of the initial value; None: as large as the value's order of magnitude
+    min: float = -np.inf
+    max: float = np.inf
+    drift: float | None = None  # relative random walk per e-fold of crush; None: by shape
+    shape: str = "curve"  # structured fit: "curve" = F(X) free in crush, "constant" = one K
+
+
+@dataclass(frozen=True)
+class Element:
+    """A spring and damper between two bodies."""
+
+    name: str
+    between: tuple[str, str]
+    stiffness: Coefficient
+    damping: Coefficient = Coefficient()
+    tension: bool = True  # False: carries compression only
+    unloading: float | None = None  # known unloading stiffness, N/m; None: elastic
+    displacement: str | None = None  # channel of the crush, instead of integrating accelerations
+    velocity: str | None = None  # channel of the rate of crush; None: the crush's derivative
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One entry of theta: a coefficient with its name, unit and scale."""
+
+    name: str
+    unit: str
+    element: int
+    is_stiffness: bool
+    coefficient: Coefficient
+    scale: float  # order of magnitude, for the initial standard deviation
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Bodies and elements; checked when made."""
+
+    name: str
+    bodies: tuple[Body, ...]
+    elements: tuple[Element, ...]
+
+    def __post_init__(self):
+        for element in self.elements:
+            for end in element.between:
+                self._require(end, [body.name for body in self.bodies], f"element {element.name}: no body")
+        for body in self.bodies:
+            if body.free and not (body.mass and body.mass > 0):
+                raise ModelError(f"model {self.name}: body {body.name} is free and needs a mass > 0 kg")
+            if not body.fixed and not body.acceleration:
+                raise ModelError(f"model {self.name}: body {body.name} names no channel for its motion")
+        if not self.equations:
+            raise ModelError(f"model {self.name} has no equation to fit: give a free body an acceleration channel")
+
+    def _require(self, name: str, known: Sequence[str], complaint: str) -> None:
+        if name not in known:
+            near = get_close_matches(name, known, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else f"; there are {', '.join(known)}"
+            raise ModelError(f"model {self.name}: {complaint} {name!r}{hint}")
+
+    @cached_property
+    def body_index(self) -> dict[str, int]:
+        return {body.name: k for k, body in enumerate(self.bodies)}
+
+    @cached_property
+    def ends(self) -> np.ndarray:
+        """(elements, 2) indices of the bodies a and b."""
+        return np.array([[self.body_index[end] for end in e.between] for e in self.elements]).reshape(-1, 2)
+
+    @cached_property
+    def equations(self) -> tuple[int, ...]:
+        """Indices of the bodies that give an equation: free with a channel, or fixed with a measured force."""
+        return tuple(k for k, b in enumerate(self.bodies) if (b.free and b.acceleration) or (b.fixed and b.force))
+
+    @cached_property
+    def equation_units(self) -> tuple[str, ...]:
+        return tuple("m/s^2" if self.bodies[k].free else "N" for k in self.equations)
+
+    @cached_property
+    def force_to_equation(self) -> np.ndarray:
+        """(equations, elements) delta / M: what one newton in an element adds to each equation's right-hand side."""
+        share = np.zeros((len(self.equations), len(self.elements)))
+        for row, k in enumerate(self.equations):
+            inertia = self.bodies[k].mass if self.bodies[k].free else 1.0
+            share[row] = ((self.ends[:, 1] == k).astype(float) - (self.ends[:, 0] == k)) / inertia
+        return share
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Stiffness and damping of every element, known ones included."""
+        found = []
+        for k, element in enumerate(self.elements):
+            mass = self._reduced_mass(k)
+            for kind, unit, scale in (
+                ("stiffness", "N/m", mass * CONTACT_FREQUENCY**2),
+                ("damping", "N*s/m", mass * CONTACT_FREQUENCY),
+            ):
+                coefficient = getattr(element, kind)
+                scale = max(abs(coefficient.value), scale)
+                found.append(Parameter(f"{element.name}.{kind}", unit, k, kind == "stiffness", coefficient, scale))
+        return tuple(found)
+
+    def _reduced_mass(self, element: int) -> float:
+        """Of the two bodies of an element; a driven or fixed one counts as infinitely heavy."""
+        ends = (self.bodies[k] for k in self.ends[element])
+        inverse = sum(1.0 / body.mass for body in ends if body.free and body.mass)
+        return 1.0 / inverse if inverse else 1.0
+
+    def check_channels(self, test: Test) -> None:
+        """Every channel that the model names is in the test and of the right quantity, or a one-line error."""
+        for wanted_by, name, quantity in self.channels():
+            channel = test.channels[test.index(name, wanted_by)]
+            if channel.quantity != quantity:
+                raise ModelError(
+                    f"{wanted_by} of model {self.name} needs a channel of {quantity}, "
+                    f"but {name} of test {test.id} is one of {channel.quantity}"
+                )
+
+    def channels(self) -> list[tuple[str, str, str]]:
+        """(wanted by, channel, quantity) for every channel that the model reads."""
+        wanted = [(f"body {b.name}", name, "acceleration") for b in self.bodies for name in b.acceleration]
+        wanted += [(f"body {b.name}", b.force, "force") for b in self.bodies if b.force]
+        wanted += [(f"element {e.name}", e.displacement, "displacement") for e in self.elements if e.displacement]
+        wanted += [(f"element {e.name}", e.velocity, "velocity") for e in self.elements if e.velocity]
+        return wanted

@@ -1,0 +1,166 @@
+"""Model files: YAML -> Structure. The keys are those of the README's table; nothing in a file is executed."""
+
+from difflib import get_close_matches
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFloat, model_validator
+
+from crash_replay.yaml_schema import load_yaml
+
+from .core.structure import Body, Coefficient, Element, ModelError, Structure
+
+
+class Part(BaseModel):
+    """A mapping of the file: unknown keys are errors, and so are numbers that are not finite."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class CoefficientPart(Part):
+    """`stiffness: 2.0e6` (known), or `stiffness: {estimate: true, initial: 5.0e5, min: 0.0}`."""
+
+    estimate: bool = False
+    value: float | None = None
+    initial: float | None = None
+    std: PositiveFloat | None = None
+    min: float | None = None
+    max: float | None = None
+    shape: Literal["curve", "constant"] = "curve"
+    drift: NonNegativeFloat | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _plain_number(cls, given: Any) -> Any:
+        return {"value": given} if isinstance(given, (int, float)) and not isinstance(given, bool) else given
+
+    @model_validator(mode="after")
+    def _known_or_estimated(self):
+        if self.estimate and self.value is not None:
+            raise ValueError("give `initial` for an estimated coefficient, or `value` for a known one, not both")
+        if not self.estimate and (self.value is None or self.initial is not None):
+            raise ValueError("expected a number (known), or `estimate: true` with an `initial` value")
+        low, high = self._bounds()
+        start = self.initial if self.estimate and self.initial is not None else 0.0
+        if low > high or (self.estimate and self.initial is not None and not low <= start <= high):
+            raise ValueError(f"min <= initial <= max must hold, got min {low:g}, initial {start:g}, max {high:g}")
+        return self
+
+    def _bounds(self) -> tuple[float, float]:
+        return -np.inf if self.min is None else self.min, np.inf if self.max is None else self.max
+
+    def coefficient(self) -> Coefficient:
+        low, high = self._bounds()
+        value = self.initial if self.estimate else self.value
+        return Coefficient(
+            value=min(max(0.0, low), high) if value is None else value,
+            estimated=self.estimate,
+            std=self.std,
+            min=low,
+            max=high,
+            drift=self.drift,
+            shape=self.shape,
+        )
+
+
+class BodyPart(Part):
+    mass: PositiveFloat | None = None  # kg
+    acceleration: str | tuple[str, ...] = ()
+    motion: str | tuple[str, ...] | None = None
+    fixed: bool = False
+    force: str | None = None
+    noise: PositiveFloat | None = None  # m/s^2, or N for a measured force
+
+    @model_validator(mode="after")
+    def _one_kind(self):
+        if self.motion is not None and (self.fixed or self.acceleration or self.mass):
+            raise ValueError("a driven body (`motion`) takes no mass, acceleration or fixed")
+        if self.fixed and (self.acceleration or self.mass):
+            raise ValueError("a fixed body takes no mass and no acceleration")
+        if self.force and not self.fixed:
+            raise ValueError("`force` is the measured force on a fixed body: add `fixed: true`")
+        return self
+
+    def body(self, name: str) -> Body:
+        channels = self.acceleration if self.motion is None else self.motion
+        return Body(
+            name,
+            mass=self.mass,
+            acceleration=(channels,) if isinstance(channels, str) else tuple(channels),
+            driven=self.motion is not None,
+            fixed=self.fixed,
+            force=self.force,
+            noise=self.noise,
+        )
+
+
+class ElementPart(Part):
+    between: tuple[str, str]
+    stiffness: CoefficientPart
+    damping: CoefficientPart = CoefficientPart(value=0.0)
+    tension: Literal["none", "both"] = "both"
+    unloading: PositiveFloat | None = None  # N/m
+    displacement: str | None = None
+    velocity: str | None = None
+
+    @model_validator(mode="after")
+    def _checks(self):
+        if self.between[0] == self.between[1]:
+            raise ValueError(f"between must name two different bodies, got {self.between[0]} twice")
+        if self.velocity and not self.displacement:
+            raise ValueError("`velocity` goes with `displacement`")
+        return self
+
+    def element(self, name: str) -> Element:
+        return Element(
+            name,
+            between=self.between,
+            stiffness=self.stiffness.coefficient(),
+            damping=self.damping.coefficient(),
+            tension=self.tension != "none",
+            unloading=self.unloading,
+            displacement=self.displacement,
+            velocity=self.velocity,
+        )
+
+
+class ModelFile(Part):
+    name: str = Field(min_length=1)
+    bodies: dict[str, BodyPart] = Field(min_length=1)
+    elements: dict[str, ElementPart] = Field(min_length=1)
+
+    def structure(self) -> Structure:
+        return Structure(
+            self.name,
+            tuple(part.body(name) for name, part in self.bodies.items()),
+            tuple(part.element(name) for name, part in self.elements.items()),
+        )
+
+
+def ready_models() -> dict[str, Path]:
+    """The models that ship with the package, by name."""
+    folder = Path(str(files("crash_estimator") / "models"))
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+def load_model(name_or_path: str | Path) -> Structure:
+    """A ready model by its name, or a model file by its path.
+
+    Raises ModelError with one line that names the file, the line and the key.
+    """
+    path = Path(name_or_path)
+    if path.suffix not in (".yaml", ".yml"):
+        ready = ready_models()
+        if str(name_or_path) not in ready:
+            near = get_close_matches(str(name_or_path), ready, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise ModelError(
+                f"there is no model {str(name_or_path)!r}: give one of {', '.join(ready)}, or the path of a .yaml file{hint}"
+            )
+        path = ready[str(name_or_path)]
+    try:
+        return load_yaml(path, ModelFile).structure()
+    except ModelError as error:
+        raise ModelError(f"{path}: {error}") from None

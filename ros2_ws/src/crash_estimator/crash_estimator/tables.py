@@ -1,0 +1,67 @@
+"""Terminal tables of what an estimator found, in the units crash engineers read."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .core.errors import EquationError
+from .core.estimate import Description, Estimate, ParameterStatus
+
+READABLE = {"N/m": ("kN/m", 1e-3), "N*s/m": ("N s/m", 1.0), "m/s^2": ("g", 1.0 / 9.80665), "N": ("kN", 1e-3), "kg": ("kg", 1.0)}
+"""SI unit -> the unit shown and the factor to it."""
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Columns as wide as their widest cell: the first to the left, the others to the right."""
+    lines = [list(head), *[list(row) for row in rows]]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(head))]
+    aligned = [
+        "  ".join(cell.ljust(width) if k == 0 else cell.rjust(width) for k, (cell, width) in enumerate(zip(line, widths)))
+        for line in lines
+    ]
+    return "\n".join([aligned[0], "-" * len(aligned[0]), *aligned[1:]])
+
+
+def parameter_table(description: Description, estimates: Sequence[Estimate]) -> str:
+    """Every parameter where its element carries most, with sigma and status, and that peak force."""
+    rows = []
+    element_of = {name: k for k, name in enumerate(description.elements)}
+    for k, (name, unit) in enumerate(zip(description.parameters, description.parameter_units)):
+        element = element_of[name.rsplit(".", 1)[0]]
+        peak = max(estimates, key=lambda estimate: abs(estimate.force[element]))
+        shown, factor = READABLE[unit]
+        known = ParameterStatus(peak.status[k]) == ParameterStatus.KNOWN
+        rows.append(
+            (
+                name,
+                f"{peak.parameters[k] * factor:.1f}",
+                "" if known else f"{peak.std[k] * factor:.1f}",
+                shown,
+                ParameterStatus(peak.status[k]).name.lower(),
+                f"{peak.time_ns * 1e-6:.1f}",
+                f"{peak.crush[element] * 1e3:.0f}",
+                f"{peak.force[element] * 1e-3:.2f}",
+            )
+        )
+    return table(("parameter at peak force", "value", "sigma", "unit", "status", "at ms", "crush mm", "force kN"), rows)
+
+
+def error_table(errors: Sequence[EquationError]) -> str:
+    """Mean and standard deviation of measurement and error per equation (tables 5.1 and 5.2 give variances)."""
+    rows = []
+    for row in errors:
+        shown, factor = READABLE[row.unit]
+        share = row.error_variance / row.input_variance if row.input_variance else np.nan
+        rows.append(
+            (
+                row.equation,
+                shown,
+                f"{row.input_mean * factor:.2f}",
+                f"{np.sqrt(row.input_variance) * factor:.2f}",
+                f"{row.error_mean * factor:.3f}",
+                f"{np.sqrt(row.error_variance) * factor:.3f}",
+                f"{1.0 - share:.1%}",
+            )
+        )
+    head = ("equation", "unit", "measured mean", "sd", "error mean", "sd", "explained")
+    return table(head, rows)

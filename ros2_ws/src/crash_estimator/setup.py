@@ -1,0 +1,23 @@
+from glob import glob
+
+from setuptools import find_packages, setup
+
+setup(
+    name="crash_estimator",
+    version="0.1.0",
+    packages=find_packages(),
+    package_data={"crash_estimator": ["models/*.yaml"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/crash_estimator"]),
+        ("share/crash_estimator", ["package.xml"]),
+        ("share/crash_estimator/launch", glob("launch/*.launch.py")),
+        ("share/crash_estimator/models", glob("crash_estimator/models/*.yaml")),
+    ],
+    entry_points={
+        "console_scripts": [
+            "estimate = crash_estimator.cli.estimate:main",
+            "estimator = crash_estimator.nodes.estimator_node:main",
+            "viewer = crash_estimator.nodes.viewer_node:main",
+        ]
+    },
+)
