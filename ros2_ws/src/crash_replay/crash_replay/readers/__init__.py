@@ -1,0 +1,60 @@
+"""Recordings from files, one format a file; the format is found from what is there."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..bag import read_bag
+from ..recording import Recording, RecordingError
+from . import csv_yaml, isomme, nhtsa
+from .description import apply_names
+
+
+class Reader(NamedTuple):
+    """A format: how it is recognised and read, and which options it takes."""
+
+    expects: str
+    found: Callable[[Path], bool]
+    read: Callable[..., Recording]
+    options: tuple[str, ...] = ()
+
+
+def _is_bag(path: Path) -> bool:
+    return path.suffix == ".mcap" or (path.is_dir() and ((path / "metadata.yaml").exists() or any(path.glob("*.mcap"))))
+
+
+READERS = (
+    Reader("a .csv file with a .yaml of the same name beside it", csv_yaml.found, csv_yaml.read),
+    Reader("a folder with an .EV5 header", nhtsa.found, nhtsa.read, ("cells",)),
+    Reader("a folder with an .mme header", isomme.found, isomme.read),
+    Reader("a bag (a rosbag2 folder or an .mcap file)", _is_bag, read_bag, ("recover",)),
+)
+
+
+def read_source(path: str | Path, names: str | Path | None = None, **options: Any) -> Recording:
+    """The recording at `path`, in whichever format it is; `options` that are None or False are not given.
+
+    `names` is a YAML file that renames channels and sets bodies (see `description.Names`); without it,
+    `import.yaml` in the folder does. Raises RecordingError with one readable line.
+    """
+    path = Path(path)
+    reader = _reader_for(path)
+    given = {option: value for option, value in options.items() if value not in (None, False)}
+    for option in given:
+        if option not in reader.options:
+            raise RecordingError(f"{path}: {reader.expects} takes no option {option!r}; leave it out")
+    recording = reader.read(path, **given)
+    beside = path / "import.yaml"
+    if names is None and path.is_dir() and beside.is_file():
+        names = beside
+    return apply_names(recording, Path(names)) if names else recording
+
+
+def _reader_for(path: Path) -> Reader:
+    if not path.exists():
+        raise RecordingError(f"{path}: there is no such file or folder")
+    for reader in READERS:
+        if reader.found(path):
+            return reader
+    expected = "; ".join(reader.expects for reader in READERS)
+    raise RecordingError(f"{path}: no recording of a known form; expected one of: {expected}")

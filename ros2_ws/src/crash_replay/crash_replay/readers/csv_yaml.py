@@ -1,0 +1,141 @@
+"""CSV with a YAML of the same name beside it.
+
+    rib.csv:   time,rib_ay,...         s, then one column for each channel
+    rib.yaml:  test: {id: T1, title: "...", source: "..."}
+               channels: {rib_ay: {quantity: acceleration, unit: g, body: rib, axis: y, sign: 1}}
+               initial_velocity: {rib: 0.0}          m/s at time zero and before it
+               initial_displacement: {rib: -0.02}    m at time zero
+
+A channel's `name` replaces the column's, where that does not fit (letters, digits and underscores).
+"""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, FiniteFloat
+
+from ..recording import SI_UNIT, Channel, Recording, RecordingError, Test
+from ..yaml_schema import load_yaml, suggestion
+from .description import ChannelNames, Part, TestPart, unknown_bodies
+from .units import si_factor
+
+
+class CsvChannel(ChannelNames):
+    quantity: Literal[tuple(SI_UNIT)]
+    unit: str
+    sign: Literal[1, -1] = 1
+
+
+class CsvDescription(Part):
+    test: TestPart = TestPart()
+    channels: dict[str, CsvChannel] = Field(min_length=1)
+    initial_velocity: dict[str, FiniteFloat] = {}
+    initial_displacement: dict[str, FiniteFloat] = {}
+
+
+def found(path: Path) -> bool:
+    return path.is_file() and path.suffix.lower() == ".csv"
+
+
+def read(path: Path) -> Recording:
+    """The recording. Raises RecordingError with one line that names file, line and column or key."""
+    beside = next((p for p in (path.with_suffix(".yaml"), path.with_suffix(".yml")) if p.is_file()), None)
+    if beside is None:
+        raise RecordingError(
+            f"{path}: expected {path.with_suffix('.yaml').name} beside it, with test and channels (units)"
+        )
+    description = load_yaml(beside, CsvDescription)
+    columns, table = _read_table(path)
+    channels, values, notes = [], [], []
+    for column, given in description.channels.items():
+        if column not in columns:
+            raise RecordingError(
+                f"{beside}: channels.{column}: {path.name} has no such column; {suggestion(column, columns)}"
+            )
+        try:
+            factor = given.sign * si_factor(given.quantity, given.unit)
+        except RecordingError as error:
+            raise RecordingError(f"{beside}: channels.{column}: {error}") from None
+        source = f"{path.name}: {column} in {given.unit}" + (", sign turned" if given.sign < 0 else "")
+        channels.append(Channel(given.name or column, given.quantity, given.body or "", given.axis or "", source))
+        values.append(factor * table[:, columns.index(column)])
+    left_out = [column for column in columns[1:] if column not in description.channels]
+    if left_out:
+        notes.append(f"left out, not described in {beside.name}: {', '.join(left_out)}")
+    notes += unknown_bodies(channels, description.initial_velocity)
+    test = Test(
+        id=description.test.id or path.stem,
+        channels=tuple(channels),
+        title=description.test.title,
+        source=description.test.source,
+        initial_velocity=description.initial_velocity,
+        initial_displacement=description.initial_displacement,
+        notes=tuple(notes),
+    )
+    return Recording(test, np.rint(table[:, 0] * 1e9).astype(np.int64), np.stack(values, axis=1))
+
+
+def _read_table(path: Path) -> tuple[list[str], np.ndarray]:
+    """The header's names, and the numbers (rows, columns); NaN for an empty cell and for what is not finite."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            lines = csv.reader(file)
+            columns = [name.strip() for name in next(lines, [])]
+            _check_header(path, columns)
+            rows = [_numbers(path, lines.line_num, columns, cells) for cells in lines if cells]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise RecordingError(f"{path}: cannot be read as a CSV text file ({error})") from None
+    if not rows:
+        raise RecordingError(f"{path}: has no samples, only a header")
+    table = np.array(rows)
+    table[~np.isfinite(table)] = np.nan
+    _check_time(path, table[:, 0])
+    return columns, table
+
+
+def _check_header(path: Path, columns: Sequence[str]) -> None:
+    if len(columns) < 2 or columns[0] != "time":
+        shown = ",".join(columns)[:60]
+        raise RecordingError(
+            f"{path}:1: expected a header of comma-separated names, the first `time` (in s), found {shown!r}"
+        )
+    doubled = [name for name in columns if columns.count(name) > 1]
+    if doubled:
+        raise RecordingError(f"{path}:1: column {doubled[0]!r} appears more than once: rename or remove one")
+
+
+def _numbers(path: Path, line: int, columns: Sequence[str], cells: Sequence[str]) -> list[float]:
+    if len(cells) != len(columns):
+        raise RecordingError(f"{path}:{line}: expected {len(columns)} cells as in the header, found {len(cells)}")
+    try:
+        return [float(cell) if cell.strip() else np.nan for cell in cells]
+    except ValueError:
+        name, cell = next((n, c) for n, c in zip(columns, cells) if c.strip() and not _is_number(c))
+        raise RecordingError(
+            f"{path}:{line}: column {name!r}: expected a number or an empty cell, found {cell!r}"
+        ) from None
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _check_time(path: Path, time: np.ndarray) -> None:
+    """Time is a number in every row and increases by a nanosecond or more."""
+    row = np.flatnonzero(np.isnan(time))
+    if len(row):
+        raise RecordingError(f"{path}: sample {row[0]}: time is missing")
+    backwards = np.flatnonzero(np.diff(np.rint(time * 1e9)) <= 0)
+    if len(backwards):
+        k = int(backwards[0]) + 1
+        raise RecordingError(
+            f"{path}: sample {k}: time must increase from sample to sample, "
+            f"but {time[k]:.9g} s follows {time[k - 1]:.9g} s"
+        )

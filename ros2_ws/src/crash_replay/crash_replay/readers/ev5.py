@@ -1,0 +1,114 @@
+"""The header of an NHTSA crash test in EV5 form: sections of records whose fields are separated by `|`.
+
+The fields follow NHTSA's test reference guide, version 5.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from ..recording import RecordingError
+
+
+class Curve(NamedTuple):
+    """One INSTRUMENTATION record."""
+
+    vehicle: int  # 0: the barrier
+    number: int  # the file's suffix
+    sensor: str  # AC, LC, DS, AV, ...
+    occupant: str  # 01 driver, 02 passenger, NA
+    location: str  # HDCG, ENGN, FLLR, LC0101, ...
+    axis: str  # XL, YG, NA, ...
+    time_unit: str
+    unit: str  # G'S, NWT, ...
+    prefilter: str  # Hz
+    maker: str
+    calibration: str
+    full_scale: str
+    full_scale_used: str  # %
+    initial_velocity: float  # km/h along the axis
+    first: int  # index of the first sample; time zero is index 0
+    last: int
+    step: float  # us
+    status: str  # AM as measured, CM computed, CF failed, NO none
+    redundancy: str  # P primary, R redundant
+    comment: str
+
+
+class Header(NamedTuple):
+    number: str  # of the test
+    title: str
+    date: str
+    laboratory: str
+    configuration: str  # VTB: vehicle into barrier, ...
+    closing_speed: float  # km/h
+    masses: dict[int, float]  # vehicle -> test mass in kg
+    curves: tuple[Curve, ...]
+
+
+NUMERIC = {
+    field: Curve.__annotations__[field] for field in ("vehicle", "number", "initial_velocity", "first", "last", "step")
+}
+TEST_FIELDS = 20
+
+
+def read_header(path: Path) -> Header:
+    """The header. Raises RecordingError with file, line and what was expected."""
+    try:
+        lines = path.read_text(encoding="latin-1").splitlines()
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
+    sections: dict[str, list[tuple[int, list[str]]]] = {}
+    name = ""
+    for number, line in enumerate(lines, start=1):
+        if line.startswith("-----"):
+            name = line.strip("- \r")
+        elif name and line.strip():
+            sections.setdefault(name, []).append((number, line.rstrip("\r").split("|")))
+    for wanted in ("TEST", "INSTRUMENTATION"):
+        if not sections.get(wanted):
+            raise RecordingError(
+                f"{path}: expected an EV5 header with a section `----- {wanted} -----` and records in it"
+            )
+    line, test = sections["TEST"][0]
+    if len(test) < TEST_FIELDS:
+        raise RecordingError(f"{path}:{line}: expected {TEST_FIELDS} fields in a TEST record, found {len(test)}")
+    return Header(
+        number=_test_number(path, lines),
+        title=test[1],
+        date=test[3],
+        laboratory=test[4],
+        configuration=test[8],
+        closing_speed=_number(path, line, "closing speed", test[14]),
+        masses={
+            int(_number(path, n, "vehicle", f[0])): _number(path, n, "test mass", f[10])
+            for n, f in sections.get("VEHICLE", [])
+            if len(f) > 10
+        },
+        curves=tuple(_curve(path, n, fields) for n, fields in sections["INSTRUMENTATION"]),
+    )
+
+
+def _test_number(path: Path, lines: Sequence[str]) -> str:
+    """From the first comment line, else from the file's name (v10146.EV5)."""
+    if lines and "Test Number:" in lines[0]:
+        return lines[0].split("Test Number:")[1].strip()
+    return path.stem.lstrip("vV")
+
+
+def _curve(path: Path, line: int, fields: Sequence[str]) -> Curve:
+    if len(fields) != len(Curve._fields):
+        raise RecordingError(
+            f"{path}:{line}: expected {len(Curve._fields)} fields in an INSTRUMENTATION record, found {len(fields)}"
+        )
+    given = dict(zip(Curve._fields, (field.strip() for field in fields)))
+    for name, kind in NUMERIC.items():
+        given[name] = kind(_number(path, line, name, given[name]))
+    return Curve(**given)
+
+
+def _number(path: Path, line: int, what: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise RecordingError(f"{path}:{line}: {what}: expected a number, found {text!r}") from None

@@ -1,0 +1,159 @@
+"""ISO-MME folders, as ISO/TS 13499 describes them."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from crash_replay.readers import read_source
+from crash_replay.readers.isomme_codes import channel_of
+from crash_replay.recording import RecordingError
+
+MME = """\
+Data format edition number  :1.6
+Laboratory name             :A lab
+Title                       :Überprüfung
+Test number                 :T7
+Date of the test            :2026-05-14
+Number of test objects      :1
+Velocity test object 1      :15.6
+Mass test object 1          :1500
+"""
+
+
+def channel_file(code, values, unit="g", **more):
+    header = {
+        "Channel code": code, "Name of the channel": "a name: with a colon", "Unit": unit,
+        "Reference channel": "implicit", "Sampling interval": "0.0001", "Time of first sample": "-0.0002",
+        "Number of samples": len(values), "Data status": "ok",
+    } | {key.replace("_", " ").capitalize(): value for key, value in more.items()}  # fmt: skip
+    return "".join(f"{key:28}:{value}\n" for key, value in header.items()) + "".join(f"{v:.6E}\n" for v in values)
+
+
+FILES = [
+    channel_file("10VEHC000000ACXP", [0, 0, -1, -2, -3]),
+    channel_file("11HEADCG00H3ACXA", [0, 0, 0, -1, -2], unit="m/(s*s)"),
+    channel_file("B0LOCE000000FOX0", [0, 0, 1, 2, 3], unit="kN"),
+    channel_file("13FEMRLE00H3FOZB", [0, 1, 2], unit="N", time_of_first_sample="0"),
+    channel_file("13CHST0000H3DSXC", [9] * 5, unit="mm", data_status="channel failed"),
+    channel_file("13CHST0000H3TEXC", [9] * 5, unit="C"),
+    channel_file("11TIRS000000TIRP", [-2e-4, -1e-4, 0, 1e-4, 2e-4], unit="s"),
+    channel_file(
+        "11PELV0000H3ACYP", [1, 2, 3, 4, 5], reference_channel="explicit", reference_channel_name="11TIRS000000TIRP"
+    ),
+    channel_file("11PELV0000H3ACZP", [1, 2], sampling_interval="0.001"),
+]
+
+
+def write_folder(folder, files=FILES, mme=MME, encoding="latin-1"):
+    (folder / "T7.MME").write_text(mme, encoding=encoding)
+    (folder / "Channel").mkdir(exist_ok=True)
+    (folder / "Channel/T7.chn").write_text("Instrumentation standard    :ISO 6487\n")
+    for number, text in enumerate(files, start=1):
+        (folder / f"Channel/T7.{number:03d}").write_text(text)
+    return folder
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-8"])
+def test_folder(tmp_path, encoding):
+    recording = read_source(write_folder(tmp_path, encoding=encoding))
+    test = recording.test
+    assert (test.id, test.title, test.source) == ("T7", "Überprüfung", "A lab, 2026-05-14, T7.MME")
+    assert_array_equal(recording.time_ns, np.arange(-2, 3) * 100_000)
+    assert [(c.name, c.body, c.axis) for c in test.channels] == [
+        ("car_ax", "car", "x"),
+        ("front_left_head_ax_cfc1000", "front_left_head", "x"),
+        ("barrier_loce_fx", "barrier", "x"),
+        ("front_right_femur_left_fz_cfc600", "front_right_femur_left", "z"),
+        ("front_left_pelvis_ay", "front_left_pelvis", "y"),
+    ]
+    assert_allclose(recording.column("car_ax"), np.array([0, 0, -1, -2, -3]) * 9.80665)
+    assert_allclose(recording.column("front_left_head_ax_cfc1000"), [0, 0, 0, -1, -2])
+    assert_allclose(recording.column("barrier_loce_fx"), [0, 0, 1e3, 2e3, 3e3])
+    assert_allclose(recording.column("front_right_femur_left_fz_cfc600"), [np.nan, np.nan, 0, 1, 2])
+    assert_allclose(recording.column("front_left_pelvis_ay"), np.arange(1, 6) * 9.80665)
+    assert test.initial_velocity == dict.fromkeys(
+        ["car", "front_left_head", "front_right_femur_left", "front_left_pelvis"], 15.6
+    )
+    assert test.notes == (
+        "left out, T7.005: its status is 'channel failed'",
+        "left out, T7.006: dimension TE has no ROS message",
+        "left out, sampled at another rate than 10000 Hz: front_left_pelvis_az",
+        "front_right_femur_left_fz_cfc600: 3 of 5 samples, NaN elsewhere",
+        "barrier forces keep their recorded sign; a model expects compression to be positive",
+        "initial velocity 15.6 m/s along the object's own x: "
+        "car, front_left_head, front_right_femur_left, front_left_pelvis",
+    )
+
+
+@pytest.mark.parametrize(
+    "code, name, body",
+    [
+        ("11HEADCG00H3ACXP", "front_left_head_ax", "front_left_head"),
+        ("10ENGN000000ACXP", "engine_ax", "engine"),
+        ("14BPILLEUP00ACYD", "second_left_b_pillar_left_upper_ay_cfc60", "second_left_b_pillar_left_upper"),
+        ("M0VEHC000000ACXP", "mdb_car_ax", "mdb_car"),
+        ("11HEAD0000H3AVZ0", "front_left_head_wz", "front_left_head"),
+        ("11TRRILE01WSDSYP", "front_left_rib_left_01_dy", "front_left_rib_left_01"),
+    ],
+)
+def test_names(code, name, body):
+    channel = channel_of(code, "", several_objects=False)
+    assert (channel.name, channel.body) == (name, body)
+    assert channel_of("20HEADCG00H3ACXP", "", several_objects=True).name == "object2_head_ax"
+
+
+def test_a_velocity_with_its_unit_and_doubled_names(tmp_path):
+    mme = MME.replace(":15.6", ":57.6 km/h")
+    recording = read_source(write_folder(tmp_path, [FILES[0], FILES[0]], mme))
+    assert recording.test.channel_names == ("car_ax", "car_ax_2")
+    assert_allclose(recording.test.initial_velocity["car"], 16.0)
+
+
+@pytest.mark.parametrize(
+    "wrong, message",
+    [
+        (
+            channel_file("10VEHC00ACXP", [1]),
+            "left out, T7.001: expected a channel code of 16 letters and digits, found '10VEHC00ACXP'",
+        ),
+        (channel_file("10VEHC000000ACXP", []), "left out, T7.001: it has no values"),
+        (channel_file("10VEHC000000ACXP", [1], unit="gs"), "left out, T7.001: unknown unit 'gs' for acceleration"),
+        (
+            channel_file("10VEHC000000ACXP", [1], sampling_interval="NOVALUE"),
+            "'sampling interval': expected a number, found 'NOVALUE'",
+        ),
+        (
+            channel_file("10VEHC000000ACXP", [1, 2], sampling_interval="0"),
+            "its time does not increase from sample to sample",
+        ),
+        (
+            channel_file("10VEHC000000ACXP", [1], reference_channel="explicit"),
+            "its time channel (not named) is missing",
+        ),
+    ],
+)
+def test_channels_at_fault_are_named(tmp_path, wrong, message):
+    with pytest.raises(RecordingError) as raised:
+        read_source(write_folder(tmp_path, [wrong]))
+    assert str(raised.value).startswith(f"{tmp_path}: no channel can be used: left out, T7.001: ")
+    assert message in str(raised.value)
+
+
+def test_folders_at_fault(tmp_path):
+    def error():
+        with pytest.raises(RecordingError) as raised:
+            read_source(tmp_path)
+        return str(raised.value)
+
+    write_folder(tmp_path, [FILES[0] + "words\n"])
+    assert error() == f"{tmp_path}/Channel/T7.001:14: expected a number, found 'words'"
+    shifted = channel_file("10ENGN000000ACXP", [1] * 5, time_of_first_sample="-0.00015")
+    write_folder(tmp_path, [FILES[0], shifted])
+    assert "mixed sample times" in error()
+    write_folder(tmp_path, [FILES[0]], MME.replace(":15.6", ":15 knots"))
+    (tmp_path / "Channel/T7.002").unlink()
+    assert error().startswith(f"{tmp_path}/T7.MME: velocity test object 1: unknown unit 'knots'")
+    (tmp_path / "Channel/T7.001").unlink()
+    assert error() == f"{tmp_path}/Channel: no channel files (NAME.001, NAME.002, ...)"
+    (tmp_path / "other.mme").touch()
+    assert error() == f"{tmp_path}: expected one .mme header, found T7.MME, other.mme"
