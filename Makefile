@@ -1,0 +1,19 @@
+.PHONY: help demo test bags clean
+
+help: # what there is to make
+	@sed -n 's/^\([a-z]*\):.*# /make \1	/p' Makefile
+
+demo: # a crash replayed, estimated and shown in Rerun; of your own with RECORDING=path
+	@tools/run crash_estimator demo $(if $(RECORDING),--recording "$(RECORDING)")
+
+# Without autoload: the plugins of an installed ROS 2 are written for an older pytest.
+test: # all tests; some of them with PYTEST_ARGS="-k name"
+	@tools/setup
+	@tools/screenshot-libs
+	@PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 tools/env python -m pytest -p _hypothesis_pytestplugin $(PYTEST_ARGS)
+
+bags: # the simulated recordings in bags/, made anew
+	@tools/run crash_replay synthesize --all --to bags
+
+clean: # removes what the set-up installed and built, and what the programs wrote
+	rm -rf .venv .setup out ros2_ws/build ros2_ws/install ros2_ws/log
