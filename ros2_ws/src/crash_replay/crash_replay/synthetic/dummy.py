@@ -54,7 +54,7 @@ def _scenario(
             Element("door_rib", ("door_upper", "rib"), Spring(door_rib, UNLOADING, tension=False)),
             Element("rib_spine", ("rib", "spine"), Spring(Curve((0.0, 0.02, 0.05), (1.9e5, 2.05e5, 2.3e5)))),
             Element("door_pelvis", ("door_lower", "pelvis"), Spring(door_pelvis, UNLOADING, tension=False)),
-            Element("car_pelvis", ("car", "pelvis"), Spring(Curve((0.0, 0.03, 0.10), (5.5e4, 5.2e4, 4.7e4)))),
+            Element("car_pelvis", ("car", "pelvis"), Spring(Curve((0.0, 0.03, 0.10), (5.0e4, 4.7e4, 4.3e4)))),
             Element("pelvis_spine", ("pelvis", "spine"), Spring(Curve((0.0, 0.03, 0.08), (1.15e5, 1.25e5, 1.4e5)))),
         ),
     )  # fmt: skip

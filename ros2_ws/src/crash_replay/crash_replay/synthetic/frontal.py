@@ -16,7 +16,7 @@ from .system import Body, Element, System
 def frontal_engine_cab() -> Scenario:
     """The masses, K3 and damping of the ready model `frontal_engine_cab`."""
     system = _engine_cab(
-        cab=1319.0, engine=400.0, velocity=13.3, damping=(1000.0, 200.0, 1000.0), cab_engine=2.0e6,
+        cab=1319.0, engine=400.0, velocity=13.3, damping=(1000.0, 200.0, 1000.0), cab_engine=Spring(constant(8.0e5), 5.0e6),
         cab_barrier=stepped((0.0, 8.0e5), (0.12, 4.5e5), (0.30, 3.2e5), (0.50, 4.2e5), width=0.02),
         engine_barrier=stepped((0.0, 1.0e5), (0.36, 4.2e5), (0.48, 3.0e5), width=0.02),
         unloading=1.5e7,
@@ -37,7 +37,7 @@ def frontal_abrupt() -> Scenario:
     noisy ones would make a worse zero than none.
     """
     system = _engine_cab(
-        cab=3000.0, engine=1000.0, velocity=13.3, damping=(1000.0, 1000.0, 1000.0), cab_engine=1.0e6,
+        cab=3000.0, engine=1000.0, velocity=13.3, damping=(1000.0, 1000.0, 1000.0), cab_engine=Spring(constant(1.0e6)),
         cab_barrier=stepped((0.0, 1.4e6), (0.20, 6.0e5), (0.42, 1.0e6)),
         engine_barrier=stepped((0.0, 2.0e5), (0.30, 8.0e5), (0.48, 4.0e5)),
         unloading=3.0e7,
@@ -50,7 +50,7 @@ def frontal_abrupt() -> Scenario:
 
 
 def _engine_cab(
-    cab: float, engine: float, velocity: float, damping: tuple[float, float, float], cab_engine: float,
+    cab: float, engine: float, velocity: float, damping: tuple[float, float, float], cab_engine: Spring,
     cab_barrier: Curve, engine_barrier: Curve, unloading: float,
 ) -> System:  # fmt: skip
     c1, c2, c3 = damping
@@ -59,7 +59,7 @@ def _engine_cab(
         (
             Element("cab_barrier", ("cab", "barrier"), Spring(cab_barrier, unloading), c1),
             Element("engine_barrier", ("engine", "barrier"), Spring(engine_barrier, unloading), c2),
-            Element("cab_engine", ("cab", "engine"), Spring(constant(cab_engine)), c3),
+            Element("cab_engine", ("cab", "engine"), cab_engine, c3),
         ),
     )
 

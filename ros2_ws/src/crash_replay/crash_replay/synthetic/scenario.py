@@ -23,7 +23,7 @@ class Scenario:
     system: System
     sensors: tuple[Sensor, ...]
     duration: float  # s after the impact
-    before: float = 0.050  # s before it: as long as NHTSA records; the zero offsets are known no better than its noise over sqrt(n)
+    before: float = 0.050  # s before it, as in NHTSA tests: its mean gives the zero offset
     rate: float = 10_000.0  # Hz
 
     def at_speed(self, factor: float) -> "Scenario":

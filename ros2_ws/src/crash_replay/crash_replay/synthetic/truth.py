@@ -58,7 +58,7 @@ def _element_truth(element: Element, k: int, history: History) -> ElementTruth:
     lever = np.where(on_line, peak, crush)
     lever = np.where(np.abs(lever) < SMALLEST_CRUSH, SMALLEST_CRUSH, lever)
     loaded = _evaluated(element.spring, lever, np.zeros(len(lever)), np.maximum(lever, 0.0)) / lever
-    apart = ~after | ((spring_force == 0.0) & ~none)
+    apart = ~after | ((spring_force == 0.0) & (~none | on_line))
     unloads = on_line if plastic else crush * rate < 0.0
     return ElementTruth(
         crush, rate, peak, history.force[:, k], spring_force,
