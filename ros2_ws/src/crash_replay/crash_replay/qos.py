@@ -17,3 +17,10 @@ LATCHED = QoSProfile(
     depth=1,
 )
 """What a late joiner must get as well: the test, the replay's state."""
+
+EVERY_SAMPLE = QoSProfile(
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+    history=HistoryPolicy.KEEP_ALL,
+)
+"""To subscribe to `samples` with: replay then waits for a subscriber that is slow. Others lose what overruns them."""

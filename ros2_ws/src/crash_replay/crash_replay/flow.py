@@ -1,0 +1,61 @@
+"""Keeps a publisher from outrunning its reliable subscribers."""
+
+from collections.abc import Callable, Sequence
+
+from rclpy.duration import Duration
+from rclpy.publisher import Publisher
+
+NOT_WAITING = Duration(seconds=0)
+ON_TIME = 4000
+"""Messages that may be on their way while the clock is kept: below the 5000 that a publisher holds."""
+LATE = 500
+"""Messages that may be on their way when there is no clock to keep: enough to keep all of them busy."""
+BYTES = 250_000
+"""Bytes that may be on their way: half of what Fast DDS holds between processes; what exceeds it is sent again."""
+PATIENCE = 10.0
+"""Seconds to wait for a subscriber that takes nothing; one that was killed is gone before."""
+
+
+class Flow:
+    """Counts what is sent and, before that is too much, wants all of it acknowledged.
+
+    Subscribers acknowledge what has found room in their history. So one that keeps all (qos.EVERY_SAMPLE)
+    holds the publisher back when it is full, one that keeps the last n loses what it is too slow for.
+    """
+
+    def __init__(self, publishers: Callable[[], Sequence[Publisher]], warn: Callable[[str], None]):
+        self.publishers, self.warn = publishers, warn
+        self.messages = self.bytes = 0  # since all was acknowledged
+        self.waiting_since: float | None = None
+
+    def sent(self, messages: int, size: int) -> None:
+        self.messages += messages
+        self.bytes += size
+
+    def look(self) -> None:
+        """Start counting anew if all is acknowledged. In a pause between messages, when that is likely."""
+        if (self.messages > LATE // 4 or self.bytes > BYTES // 4) and self.acknowledged():
+            self._start_anew()
+
+    def has_room(self, now: float, on_time: bool) -> bool:
+        """Whether more may be sent at the wall time `now`. Never waits: rclpy's own waiting stops all other threads."""
+        if self.messages < (ON_TIME if on_time else LATE) and self.bytes < BYTES:
+            return True
+        if self.acknowledged():
+            self._start_anew()
+            return True
+        if self.waiting_since is None:
+            self.waiting_since = now
+        if now - self.waiting_since < PATIENCE:
+            return False
+        self.warn(f"a subscriber has taken nothing for {PATIENCE:g} s: going on, it may lose samples")
+        self._start_anew()
+        return True
+
+    def acknowledged(self) -> bool:
+        """Whether every reliable subscriber has got everything."""
+        return all(publisher.wait_for_all_acked(NOT_WAITING) for publisher in self.publishers())
+
+    def _start_anew(self) -> None:
+        self.messages = self.bytes = 0
+        self.waiting_since = None

@@ -1,0 +1,172 @@
+"""Sends what the player finds due, at its time: one thread sends, commands come from others."""
+
+import math
+import time
+from collections.abc import Callable
+from threading import Condition
+from typing import Protocol
+
+from .player import Batch, CommandError, Mode, Player, Tally, suitable_block
+from .recording import Recording
+
+STATE_PERIOD = 0.1
+"""Seconds between two reports of the state while nothing changes."""
+ON_TIME = 0.05
+"""Seconds by which a message may be late before the clock counts as lost."""
+DISCOVERY = 0.5
+"""Seconds in which subscribers that are there already are found, where none are asked for."""
+ANSWER_WITHIN = 5.0
+"""Seconds after which a step or a burst is answered though it is not all sent."""
+LAST_ACKNOWLEDGEMENT = 30.0
+"""Seconds at the end for subscribers to take what has been sent; half a second where a signal has ended the replay."""
+
+
+class SubscribersMissing(Exception):
+    """Not all subscribers that were asked for have come; the message is one readable line."""
+
+
+class Outlet(Protocol):
+    """Where samples go: `replay_topics.ReplayTopics`."""
+
+    def send(self, batch: Batch) -> None: ...
+    def send_state(self, player: Player, tally: Tally, block: int) -> None: ...
+    def has_room(self, now: float, on_time: bool) -> bool: ...  # for more, at the wall time now
+    def look(self) -> None: ...  # called where there is time to see what has arrived
+    def test_has_arrived(self) -> bool: ...
+    def all_have_arrived(self) -> bool: ...
+    def subscribers(self) -> int: ...  # on samples
+    def subscriber_names(self) -> list[str]: ...
+
+
+class Pacing:
+    """The player of a recording, run by `play` in one thread and changed by `command` from any."""
+
+    def __init__(self, recording: Recording, player: Player, outlet: Outlet, block: int = 0):
+        self.recording, self.outlet, self.asked_block = recording, outlet, block
+        self.changed = Condition()  # guards the player; notified of commands and of what has been sent
+        self.player, self.block = player, self._block(player)
+        self.tally = Tally()
+        self.stopped = False  # set by a signal: ends the replay between two messages
+        self.sending = False
+        self.state_due = 0.0
+
+    def command(self, command: Callable[..., Player], *arguments) -> None:
+        """Put the player that a method of Player gives in the place of the present one."""
+        with self.changed:
+            self.player = command(self.player, *arguments, time.perf_counter())
+            self.block = self._block(self.player)
+            self.state_due = 0.0
+            self.changed.notify_all()
+
+    def send_at_once(self, command: Callable[..., Player], n: int) -> tuple[str, int]:
+        """Let `play` follow Player.step or Player.burst; one line on it and the number of samples it sent."""
+        with self.changed:
+            self.changed.wait_for(lambda: not self.sending)
+            before = self.tally.samples
+            self.command(command, n)
+            self.changed.wait_for(lambda: not self.player.pending and not self.sending, ANSWER_WITHIN)
+            sent, player = self.tally.samples - before, self.player
+        rest = f", {player.pending} still to send" if player.pending else ""
+        return f"{sent} samples sent{rest}, the next is sample {player.next}", sent
+
+    def wait_for_subscribers(self, wanted: int, timeout: float) -> None:
+        """Wait until `wanted` subscribers listen and have the test, or a command comes; raises SubscribersMissing."""
+        limit = time.perf_counter() + (timeout if wanted else DISCOVERY)
+        while self._waits() and not 0 < wanted <= self.outlet.subscribers():
+            if time.perf_counter() > limit:
+                if wanted:
+                    raise SubscribersMissing(self._who_is_missing(wanted, timeout))
+                break
+            self._send_state_if_due()
+            time.sleep(0.005)
+        limit = time.perf_counter() + DISCOVERY
+        while self._waits() and not self.outlet.test_has_arrived() and time.perf_counter() < limit:
+            time.sleep(0.001)
+
+    def start(self, paused: bool = False) -> None:
+        """Play from the first sample, or wait for commands; where one has come already, it stands."""
+        if self._waits():
+            self.command(Player.pause if paused else Player.resume)
+
+    def play(self, keep_alive: bool = False) -> None:
+        """Send what is due until a signal stops it or, without keep_alive, the last sample is sent."""
+        while not self.stopped and (keep_alive or self.player.mode != Mode.FINISHED):
+            player, block = self.player, self.block
+            due, now = player.due(block), time.perf_counter()
+            spare = math.inf if due is None else due - now
+            self._send_state_if_due(spare)
+            if spare > 0:
+                self.outlet.look()
+                self._wait(player, min(now + spare, self.state_due))
+            elif self.outlet.has_room(now, on_time=-ON_TIME < spare):
+                self._send_due(block)
+            else:
+                time.sleep(0.0005)
+
+    def finish(self) -> str:
+        """Let subscribers take what has been sent; one line on how it all went."""
+        self._send_state()
+        limit = time.perf_counter() + (DISCOVERY if self.stopped else LAST_ACKNOWLEDGEMENT)
+        self.stopped = False  # a signal from now on ends the waiting here
+        while not (arrived := self.outlet.all_have_arrived()) and not self.stopped and time.perf_counter() < limit:
+            time.sleep(0.001)
+        tally, player = self.tally, self.player
+        finished = player.mode == Mode.FINISHED
+        return (
+            ("finished" if finished else f"stopped before sample {player.next} of {len(self.recording)}")
+            + f": {tally.samples} samples sent in {tally.messages} messages, rate {tally.rate:.4g} of {player.rate:g} "
+            f"asked for, at worst {tally.worst_lateness * 1e3:.2f} ms late"
+            + ("" if arrived else "; a subscriber has not taken all of them")
+        )
+
+    def _block(self, player: Player) -> int:
+        channels = len(self.recording.test.channels)
+        return self.asked_block or suitable_block(self.recording.sample_period, player.rate, channels)
+
+    def _waits(self) -> bool:
+        return self.player.mode == Mode.WAITING and not self.stopped
+
+    def _who_is_missing(self, wanted: int, timeout: float) -> str:
+        there = sorted(self.outlet.subscriber_names())
+        return (
+            f"only {self.outlet.subscribers()} of {wanted} subscribers on samples after {timeout:g} s (there: "
+            f"{', '.join(there) or 'none'}): start the others, or lower wait_for"
+        )
+
+    def _send_due(self, block: int) -> None:
+        now = time.perf_counter()
+        with self.changed:  # a command may have come in between: then less is due, or nothing
+            self.player, batch = self.player.take(now, block)
+            self.sending = batch is not None
+        if batch is None:
+            return
+        self.outlet.send(batch)
+        with self.changed:
+            self.tally.count(batch, self.recording.time_ns.item(batch.stop - 1), now)
+            self.sending = False
+            if self.player.mode != Mode.PLAYING and not self.player.pending:
+                self.state_due = 0.0
+            self.changed.notify_all()
+
+    def _wait(self, player: Player, until: float) -> None:
+        """Wait for the wall time `until`, less if `player` is changed: asleep at first, awake for the last 0.1 ms."""
+        left = until - time.perf_counter()
+        if left > 0.002:
+            with self.changed:
+                if self.player is player:
+                    self.changed.wait(left - 0.001)
+        elif left > 0.0002:
+            time.sleep(left - 0.0001)
+        else:
+            while time.perf_counter() < until:
+                pass
+
+    def _send_state_if_due(self, spare: float = math.inf) -> None:
+        """Report the state where it takes no time from a sample, or has been put off for long."""
+        late = time.perf_counter() - self.state_due
+        if late > 0 and (spare > 0.0003 or late > STATE_PERIOD):
+            self._send_state()
+
+    def _send_state(self) -> None:
+        self.state_due = time.perf_counter() + STATE_PERIOD
+        self.outlet.send_state(self.player, self.tally, self.block)

@@ -1,0 +1,139 @@
+"""`replay`: publishes a recording at its sample rate times `rate`, under control by services."""
+
+import math
+import signal
+import sys
+from collections.abc import Callable
+from threading import Thread
+
+import rclpy
+from crash_msgs.srv import Burst, Seek, SetRate, Step
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from .bag import read_bag
+from .pacing import Pacing, SubscribersMissing
+from .player import SECOND, CommandError, Player
+from .recording import RecordingError
+from .replay_parameters import ParameterError, checked, declare_parameters
+from .replay_topics import ReplayTopics
+from .ros_runtime import acknowledge_promptly, spin
+
+
+class ReplayNode(Node):
+    """The replay's parameters, topics and services; `pacing` does what they ask for."""
+
+    def __init__(self) -> None:
+        super().__init__("replay", automatically_declare_parameters_from_overrides=True)
+        self.asked = declare_parameters(self)
+        recording = read_bag(self.asked["bag"])
+        player = Player(recording.time_ns, self.asked["rate"], self.asked["loop"])
+        topics = ReplayTopics(self, recording, self.asked["clock"])
+        self.pacing = Pacing(recording, player, topics, self.asked["block"])
+        for command in (Player.pause, Player.resume, Player.toggle):
+            self.create_service(Trigger, f"~/{command.__name__}", self._on_trigger(command))
+        self.create_service(Step, "~/step", self._on_step)
+        self.create_service(Seek, "~/seek", self._on_seek)
+        self.create_service(SetRate, "~/set_rate", self._on_set_rate)
+        self.create_service(Burst, "~/burst", self._on_burst)
+        self.add_on_set_parameters_callback(self._on_parameters)
+
+    def replay(self) -> str:
+        """All of it, in the calling thread; one line on how it went."""
+        self.pacing.wait_for_subscribers(self.asked["wait_for"], self.asked["wait_timeout"])
+        self.pacing.start(self.asked["start_paused"])
+        self.pacing.play(self.asked["keep_alive"])
+        return self.pacing.finish()
+
+    def _on_trigger(self, command: Callable) -> Callable:
+        def serve(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            self.pacing.command(command)
+            player = self.pacing.player
+            response.success = True
+            response.message = f"{player.mode.name.lower()}, the next is sample {player.next}"
+            return response
+
+        return serve
+
+    def _on_step(self, request: Step.Request, response: Step.Response) -> Step.Response:
+        try:
+            response.message, _ = self.pacing.send_at_once(Player.step, request.n)
+            response.success = True
+        except CommandError as error:
+            response.message = str(error)
+        response.number = self.pacing.player.next
+        return response
+
+    def _on_burst(self, request: Burst.Request, response: Burst.Response) -> Burst.Response:
+        try:
+            response.message, response.sent = self.pacing.send_at_once(Player.burst, request.n)
+            response.success = True
+        except CommandError as error:
+            response.message = str(error)
+        return response
+
+    def _on_seek(self, request: Seek.Request, response: Seek.Response) -> Seek.Response:
+        try:
+            if not math.isfinite(request.time):
+                raise CommandError(f"time must be a number of seconds, got {request.time}")
+            self.pacing.command(Player.seek, round(request.time * SECOND))
+            response.success, response.message = True, f"the next is sample {self.pacing.player.next}"
+        except CommandError as error:
+            response.message = str(error)
+        response.number = self.pacing.player.next
+        return response
+
+    def _on_set_rate(self, request: SetRate.Request, response: SetRate.Response) -> SetRate.Response:
+        result = self.set_parameters([Parameter("rate", value=request.rate)])[0]
+        response.success = result.successful
+        response.message = f"rate {self.pacing.player.rate:g}" if result.successful else result.reason
+        return response
+
+    def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name == "rate":
+                try:
+                    self.pacing.command(Player.set_rate, checked("rate", parameter.value))
+                except ParameterError as error:
+                    return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+
+def main() -> int:
+    acknowledge_promptly()
+    # Ctrl-C must end the replay between two messages, not take the context away under it.
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = ReplayNode()
+    except (ParameterError, RecordingError, CommandError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        rclpy.shutdown()
+        return 1
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: setattr(node.pacing, "stopped", True))
+    executor, done = EventsExecutor(), Future()
+    executor.add_node(node)
+    services = Thread(target=spin, args=(executor, done))
+    services.start()
+    try:
+        print(node.replay(), flush=True)
+        return 0
+    except SubscribersMissing as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    finally:
+        done.set_result(None)
+        executor.wake()
+        services.join()
+        executor.shutdown()
+        node.destroy_node()
+        rclpy.shutdown()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,136 @@
+"""A replay in a process of its own, and a node in this one that listens to it and gives it commands."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from threading import Thread
+
+import numpy as np
+import rclpy
+from crash_msgs.msg import ReplayState, Samples, TestInfo
+from rclpy.context import Context
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.task import Future
+
+from crash_replay.qos import EVERY_SAMPLE, LATCHED
+from crash_replay.recording import Channel, Recording, Test
+from crash_replay.ros_messages import samples_from_msg
+from crash_replay.ros_runtime import acknowledge_promptly, spin
+
+DOMAIN = 1 + os.getpid() % 100
+"""Other tests, and other people's nodes, must not hear us: each test process has a domain."""
+
+
+def some_recording(n: int = 40, period_ns: int = 1_000_000, before: int = 10, seed: int = 5) -> Recording:
+    """Random values of every quantity, one of them missing."""
+    channels = (
+        Channel("rib_ay", "acceleration", "rib", "y", "column 2"),
+        Channel("barrier_fx", "force", "barrier", "x"),
+        Channel("nose_travel", "displacement"),
+        Channel("rib_vy", "velocity", "rib", "y"),
+        Channel("neck_mz", "moment", "neck", "z"),
+        Channel("head_wx", "angular_velocity", "head", "x"),
+    )
+    values = np.random.default_rng(seed).standard_normal((n, len(channels)))
+    values[3, 1] = np.nan
+    test = Test("T7", channels, "A title", "a source", {"rib": 1.5}, {"door": -0.02}, ("a note", "another"))
+    return Recording(test, (np.arange(n, dtype=np.int64) - before) * period_ns, values)
+
+
+def environment() -> dict[str, str]:
+    return {**os.environ, "ROS_DOMAIN_ID": str(DOMAIN), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+
+
+class Replay:
+    """`replay` on a bag, with its output; ended with the test."""
+
+    def __init__(self, bag=None, **parameters):
+        command = [sys.executable, "-m", "crash_replay.replay_node", "--ros-args"]
+        for name, value in {**({"bag": bag} if bag else {}), **parameters}.items():
+            command += ["-p", f"{name}:={str(value).lower() if isinstance(value, bool) else value}"]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        self.process = subprocess.Popen(command, env=environment(), text=True, **pipes)
+
+    def end(self, timeout: float = 30.0) -> tuple[int, str, str]:
+        output, errors = self.process.communicate(timeout=timeout)
+        # what processes that were killed have left in shared memory makes Fast DDS complain, to nobody's harm
+        output = "".join(line for line in output.splitlines(keepends=True) if "RTPS_" not in line)
+        return self.process.returncode, output, errors
+
+    def interrupt(self) -> tuple[int, str, str]:
+        self.process.send_signal(signal.SIGINT)
+        return self.end()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.communicate()
+
+
+class Listener:
+    """Hears the replay's `test`, `samples` and `replay_state`; takes nothing for `stall` s after the first sample."""
+
+    def __init__(self, name: str = "listener", stall: float = 0.0):
+        acknowledge_promptly()
+        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=DOMAIN)
+        self.node = Node(name, context=self.context, start_parameter_services=False)
+        self.tests: list[TestInfo] = []
+        self.messages: list[Samples] = []
+        self.states: list[ReplayState] = []
+        self.stall = stall
+        self.listen(TestInfo, "test", self.tests.append, LATCHED)
+        self.listen(Samples, "samples", self._on_samples, EVERY_SAMPLE)
+        self.listen(ReplayState, "replay_state", self.states.append, LATCHED)
+        self.executor, self.done = EventsExecutor(context=self.context), Future()
+        self.executor.add_node(self.node)
+        self.thread = Thread(target=spin, args=(self.executor, self.done))
+        self.thread.start()
+
+    def listen(self, message_type, topic, callback, qos):
+        self.node.create_subscription(message_type, topic, callback, qos)
+
+    def _on_samples(self, message: Samples) -> None:
+        self.messages.append(message)
+        if len(self.messages) == 1:
+            time.sleep(self.stall)
+
+    def samples(self) -> list:
+        return [sample for message in self.messages for sample in samples_from_msg(message)]
+
+    def numbers(self) -> list[tuple[int, int]]:
+        """(run, number) of each sample heard."""
+        return [(m.run, m.number + k) for m in self.messages for k in range(len(m.time_ns))]
+
+    def call(self, service_type, name: str, **request):
+        client = self.node.create_client(service_type, f"replay/{name}")
+        assert client.wait_for_service(timeout_sec=10.0), f"no service {name}"
+        future = client.call_async(service_type.Request(**request))
+        wait_until(future.done, 10.0)
+        self.node.destroy_client(client)
+        return future.result()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.done.set_result(None)
+        self.executor.wake()
+        self.thread.join()
+        self.executor.shutdown()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self.context)
+
+
+def wait_until(condition, timeout: float = 10.0) -> None:
+    limit = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < limit, "waited in vain"
+        time.sleep(0.002)

@@ -1,0 +1,178 @@
+"""The thread that sends, without ROS: what it sends, when, and how commands of another thread get through."""
+
+import time
+from threading import Thread, Timer
+
+import numpy as np
+import pytest
+
+from crash_replay.pacing import Pacing, SubscribersMissing
+from crash_replay.player import Mode, Player
+from crash_replay.recording import Channel, Recording, Test
+
+
+class Outlet:
+    """Takes what the pacing sends, as long as it has room."""
+
+    def __init__(self, listeners: int = 1):
+        self.batches, self.states = [], []
+        self.room, self.arrived, self.listeners = True, True, listeners
+
+    def send(self, batch):
+        self.batches.append((time.perf_counter(), batch))
+
+    def send_state(self, player, tally, block):
+        self.states.append((player.mode, player.next))
+
+    def has_room(self, now, on_time):
+        return self.room
+
+    def look(self):
+        pass
+
+    def test_has_arrived(self):
+        return self.arrived
+
+    all_have_arrived = test_has_arrived
+
+    def subscribers(self):
+        return self.listeners
+
+    def subscriber_names(self):
+        return [f"node{k}" for k in range(self.listeners)]
+
+    def numbers(self):
+        return [number for _, batch in self.batches for number in range(batch.start, batch.stop)]
+
+
+def pacing_of(n: int = 20, period_ns: int = 1_000_000, block: int = 1, outlet=None, **options) -> Pacing:
+    time_ns = np.arange(n, dtype=np.int64) * period_ns
+    recording = Recording(Test("T", (Channel("a", "acceleration"),)), time_ns, np.zeros((n, 1)))
+    return Pacing(recording, Player(time_ns, **options), outlet or Outlet(), block)
+
+
+@pytest.fixture
+def playing():
+    """Starts pacings in threads of their own, which end with the test."""
+    started = []
+
+    def start(pacing: Pacing, **options) -> Pacing:
+        thread = Thread(target=pacing.play, kwargs=options)
+        thread.start()
+        started.append((pacing, thread))
+        return pacing
+
+    yield start
+    for pacing, thread in started:
+        pacing.stopped = True
+        thread.join()
+
+
+def wait_until(condition, timeout: float = 5.0) -> None:
+    limit = time.monotonic() + timeout
+    while not condition():
+        assert time.monotonic() < limit, "waited in vain"
+        time.sleep(0.001)
+
+
+def test_all_is_sent_in_order_and_never_before_its_time():
+    pacing = pacing_of(rate=0.2)
+    pacing.start()
+    pacing.play()
+    assert pacing.outlet.numbers() == list(range(20))
+    assert min(wall - batch.due for wall, batch in pacing.outlet.batches) >= 0.0
+    assert pacing.finish().startswith("finished: 20 samples sent in 20 messages, rate 0.")
+    assert pacing.outlet.states[-1] == (Mode.FINISHED, 20)
+
+
+def test_while_it_waits_it_sleeps():
+    pacing = pacing_of(n=6, rate=0.02)  # 50 ms from sample to sample
+    pacing.start()
+    before = time.thread_time()
+    pacing.play()
+    assert time.thread_time() - before < 0.05  # of 0.25 s
+
+
+def test_what_has_no_room_waits_and_is_sent_when_it_has(playing):
+    pacing = pacing_of(rate=1000.0, block=5)
+    pacing.outlet.room = False
+    pacing.start()
+    playing(pacing)
+    time.sleep(0.1)
+    assert pacing.outlet.batches == []
+    pacing.outlet.room = True
+    wait_until(lambda: pacing.player.mode == Mode.FINISHED)
+    assert pacing.outlet.numbers() == list(range(20))
+    assert pacing.tally.worst_lateness > 0.09
+
+
+def test_a_command_cuts_a_long_wait_short(playing):
+    pacing = playing(pacing_of(period_ns=3_600_000_000_000), keep_alive=True)
+    pacing.command(Player.resume)
+    wait_until(lambda: pacing.outlet.numbers() == [0])
+    begin = time.monotonic()
+    assert pacing.send_at_once(Player.step, 2) == ("2 samples sent, the next is sample 3", 2)
+    assert pacing.outlet.numbers() == [0, 1, 2]
+    assert time.monotonic() - begin < 2.0  # an hour otherwise
+
+
+def test_what_cannot_be_sent_at_once_is_answered_in_time(playing, monkeypatch):
+    monkeypatch.setattr("crash_replay.pacing.ANSWER_WITHIN", 0.05)
+    pacing = playing(pacing_of())
+    pacing.outlet.room = False
+    assert pacing.send_at_once(Player.burst, 7) == ("0 samples sent, 7 still to send, the next is sample 0", 0)
+    pacing.outlet.room = True
+    wait_until(lambda: pacing.outlet.numbers() == list(range(7)))
+
+
+def test_the_state_is_reported_at_changes_and_in_between(playing):
+    pacing = playing(pacing_of())
+    pacing.start(paused=True)
+    wait_until(lambda: (Mode.PAUSED, 0) in pacing.outlet.states)
+    count = len(pacing.outlet.states)
+    time.sleep(0.35)
+    assert 2 <= len(pacing.outlet.states) - count <= 5  # 10 a second
+    pacing.send_at_once(Player.burst, 3)
+    wait_until(lambda: pacing.outlet.states[-1] == (Mode.PAUSED, 3), timeout=0.09)
+
+
+def test_the_block_follows_the_rate():
+    pacing = pacing_of(period_ns=100_000, block=0)
+    assert pacing.block == 5
+    pacing.command(Player.set_rate, 0.1)
+    assert pacing.block == 1
+    assert pacing_of(period_ns=100_000, block=3).block == 3
+
+
+def test_it_waits_for_as_many_subscribers_as_were_asked_for():
+    pacing = pacing_of(outlet=Outlet(listeners=1))
+    begin = time.monotonic()
+    pacing.wait_for_subscribers(1, 10.0)
+    assert time.monotonic() - begin < 1.0
+    with pytest.raises(SubscribersMissing, match=r"only 1 of 2 .* after 0.1 s \(there: node0\): start the others, or"):
+        pacing.wait_for_subscribers(2, 0.1)
+
+
+def test_a_command_ends_the_waiting(playing):
+    pacing = pacing_of()
+    pacing.command(Player.pause)
+    pacing.wait_for_subscribers(2, 1000.0)
+    pacing.start()
+    assert pacing.player.mode == Mode.PAUSED  # the command stands
+
+
+def test_a_signal_ends_it_between_two_messages():
+    pacing = pacing_of(rate=0.01)  # 0.1 s from sample to sample
+    pacing.start()
+    Timer(0.15, lambda: setattr(pacing, "stopped", True)).start()
+    pacing.play()
+    line = pacing.finish()
+    assert 1 <= len(pacing.outlet.numbers()) < 20
+    assert line.startswith(f"stopped before sample {len(pacing.outlet.numbers())} of 20: ")
+
+
+def test_it_says_what_has_not_arrived(monkeypatch):
+    monkeypatch.setattr("crash_replay.pacing.LAST_ACKNOWLEDGEMENT", 0.05)
+    pacing = pacing_of()
+    pacing.outlet.arrived = False
+    assert pacing.finish().endswith("ms late; a subscriber has not taken all of them")

@@ -1,0 +1,86 @@
+"""A replay waits for its subscribers: with publishers that acknowledge when the test lets them."""
+
+from crash_replay.flow import BYTES, LATE, ON_TIME, PATIENCE, Flow
+
+
+class Publisher:
+    def __init__(self):
+        self.acknowledged, self.asked = True, 0
+
+    def wait_for_all_acked(self, timeout) -> bool:
+        assert timeout.nanoseconds == 0  # a longer one stops all threads
+        self.asked += 1
+        return self.acknowledged
+
+
+def flow_of(*publishers: Publisher) -> tuple[Flow, list[str]]:
+    warnings = []
+    return Flow(lambda: publishers, warnings.append), warnings
+
+
+def test_it_has_room_for_so_many_messages_more_while_the_clock_is_kept():
+    for on_time, limit in ((True, ON_TIME), (False, LATE)):
+        publisher = Publisher()
+        publisher.acknowledged = False
+        flow, _ = flow_of(publisher)
+        sent = 0
+        while flow.has_room(0.0, on_time):
+            flow.sent(1, 100)
+            sent += 1
+        assert sent == min(limit, BYTES // 100)
+
+
+def test_large_messages_count_by_their_bytes():
+    publisher = Publisher()
+    publisher.acknowledged = False
+    flow, _ = flow_of(publisher)
+    for _ in range(4):
+        assert flow.has_room(0.0, on_time=True)
+        flow.sent(1, 64_000)
+    assert not flow.has_room(0.0, on_time=True)
+
+
+def test_it_goes_on_when_all_publishers_are_acknowledged():
+    fast, slow = Publisher(), Publisher()
+    slow.acknowledged = False
+    flow, warnings = flow_of(fast, slow)
+    flow.sent(LATE, 0)
+    assert not flow.has_room(0.0, on_time=False)
+    slow.acknowledged = True
+    assert flow.has_room(0.1, on_time=False)
+    flow.sent(LATE - 1, 0)
+    assert flow.has_room(0.2, on_time=False)
+    assert warnings == []
+
+
+def test_looking_in_a_pause_starts_the_count_anew():
+    publisher = Publisher()
+    flow, _ = flow_of(publisher)
+    flow.sent(LATE - 1, 0)
+    flow.look()
+    publisher.acknowledged = False
+    flow.sent(LATE - 1, 0)
+    assert flow.has_room(0.0, on_time=False)
+
+
+def test_few_messages_are_not_asked_after():
+    publisher = Publisher()
+    flow, _ = flow_of(publisher)
+    flow.sent(10, 1000)
+    flow.look()
+    assert flow.has_room(0.0, on_time=True)
+    assert publisher.asked == 0
+
+
+def test_it_says_so_when_a_subscriber_takes_nothing_and_goes_on():
+    publisher = Publisher()
+    publisher.acknowledged = False
+    flow, warnings = flow_of(publisher)
+    flow.sent(LATE, 0)
+    assert not flow.has_room(50.0, on_time=False)
+    assert not flow.has_room(50.0 + 0.99 * PATIENCE, on_time=False)
+    assert warnings == []
+    assert flow.has_room(50.0 + 1.01 * PATIENCE, on_time=False)
+    assert warnings == ["a subscriber has taken nothing for 10 s: going on, it may lose samples"]
+    flow.sent(LATE, 0)
+    assert not flow.has_room(70.0, on_time=False)
