@@ -12,6 +12,14 @@ from crash_estimator.core.structure import Coefficient, ModelError
 
 BOTH = dict(stiffness=Coefficient(1.0e4, True, std=1.0e4), damping=Coefficient(0.0, True, std=100.0))
 NOISE = 5.0  # m/s^2
+EXACT = {  # the methods, with the settings in which nothing delays their convergence
+    "rls": {},
+    "mrls": {"cr": 1.0, "step_limit": np.inf},
+    "kalman": {"noise_memory": 0},
+    "constrained_kalman": {"noise_memory": 0},
+    "gauss_newton": {},
+    "afmm": {"noise_memory": 0, "interval": 0},
+}
 
 
 def estimates_of(method, recording, structure=None, **settings):
@@ -36,7 +44,7 @@ def test_kalman_without_process_noise_is_regularised_least_squares_at_every_samp
     structure = oscillator(
         stiffness=Coefficient(1.0e4, True, std=1.0e4, drift=0.0), damping=Coefficient(0.0, True, std=100.0)
     )
-    estimates = estimates_of("constrained_kalman", recording, structure, noise_memory=0)
+    estimates = estimates_of("constrained_kalman", recording, structure, noise_memory=0, offsets=False)
     before = recording.values[recording.time_ns < 0, 0]
     for k in (60, 100, 200, len(recording) - 1):
         # the noise that the filter has learnt before the impact, from the first innovation's variance
@@ -83,7 +91,7 @@ def test_mrls_that_never_rewinds_is_rls():
     assert not [event for e in modified for event in e.events if event.kind == "rewound"]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", EXACT)
 def test_bounds_that_never_bind_change_nothing(method):
     recording = oscillator_recording(noise=NOISE)
     bounded = oscillator(
@@ -95,7 +103,7 @@ def test_bounds_that_never_bind_change_nothing(method):
     )
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["rls", "mrls", "constrained_kalman"])  # the others know no bounds, or explain by noise
 def test_a_negative_stiffness_is_clamped_to_zero_and_the_rest_estimated_again(method):
     recording = oscillator_recording(stiffness=2.0e4, damping=300.0, noise=NOISE)
     flipped = type(recording)(recording.test, recording.time_ns, recording.values * [1.0, -1.0, 1.0])
@@ -113,10 +121,7 @@ def test_a_negative_stiffness_is_clamped_to_zero_and_the_rest_estimated_again(me
     assert any(event.kind == "clamped" for e in estimates for event in e.events)
 
 
-EXACT = {"rls": {}, "mrls": {"cr": 1.0, "step_limit": np.inf}, "constrained_kalman": {"noise_memory": 0}}
-
-
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", EXACT)
 def test_recovery_is_exact_without_noise(method):
     """Two samples determine two parameters; rewinds, clipping, drift and a noise that adapts only delay it."""
     recording = oscillator_recording(noise=0.0)
@@ -127,19 +132,22 @@ def test_recovery_is_exact_without_noise(method):
 
 @pytest.mark.parametrize("method", ["rls", "constrained_kalman"])
 def test_constant_parameters_lie_within_their_sigmas(method):
-    """Standardised errors over seeds: 95 % of a normal lies within 1.96 sigma; 120 draws leave +- 4 % (two sigma)."""
+    """Standardised errors over seeds: 95 % of a normal lies within 1.96 sigma; 400 draws leave +- 2.2 % (two sigma)."""
     structure = oscillator(stiffness=Coefficient(1.0e4, True, std=1.0e5, drift=0.0), damping=BOTH["damping"])
     settings = {"rls": dict(memory=0.01), "constrained_kalman": dict(noise_memory=0)}[method]
     errors = []
-    for seed in range(60):
-        recording = oscillator_recording(noise=NOISE, seed=seed, n=250, pre=300)
-        last = estimates_of(method, recording, structure, **settings)[-1]
-        errors.extend((last.parameters - [2.0e4, 50.0]) / last.std)
+    for seed in range(200):
+        # a long time before the impact: RLS takes the zero offset for known
+        recording = oscillator_recording(noise=NOISE, seed=seed, n=250, pre=3000)
+        estimator = make_estimator(structure, recording.test, method, **settings)
+        _, rows = estimator.follow(estimator.init(), recording.time_ns, recording.values)
+        value, std = rows[-1, estimator.columns["parameters"]], rows[-1, estimator.columns["std"]]
+        errors.extend((value - [2.0e4, 50.0]) / std)
     inside = np.mean(np.abs(errors) < 1.96)
-    assert 0.91 <= inside <= 0.99, inside
+    assert 0.92 <= inside <= 0.98, inside
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", EXACT)
 class TestConformance:
     def test_inputs_stay_and_runs_repeat(self, method):
         recording = oscillator_recording(noise=NOISE)
@@ -195,6 +203,11 @@ class TestConformance:
         assert_array_equal(last.parameters, [1.0e4, 0.0])
         assert_allclose(last.std, [1.0e4, 100.0])
         assert set(last.status.tolist()) == {ParameterStatus.APART}
+
+
+def test_every_method_is_tested_here_or_in_a_file_of_its_own():
+    # a bank of gauss_newton, in test_gauss_newton.py, and masses in place of stiffness, in test_effective_mass.py
+    assert set(METHODS) - set(EXACT) == {"gauss_newton_orders", "effective_mass"}
 
 
 def test_unknown_methods_and_settings_name_the_nearest():

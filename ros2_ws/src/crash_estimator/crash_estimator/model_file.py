@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFlo
 
 from crash_replay.yaml_schema import load_yaml
 
-from .core.structure import Body, Coefficient, Element, ModelError, Structure
+from .core.structure import Body, Coefficient, Element, ModelError, Structure, Term
 
 
 class Part(BaseModel):
@@ -101,7 +101,9 @@ class ElementPart(Part):
     stiffness: CoefficientPart
     damping: CoefficientPart = CoefficientPart(value=0.0)
     tension: Literal["none", "both"] = "both"
-    unloading: PositiveFloat | None = None  # N/m
+    unloading: PositiveFloat | CoefficientPart | None = None  # N/m; or {estimate: true, initial: ...}
+    crush_terms: dict[int, CoefficientPart] = {}  # power of the crush, 2 or more -> N/m^power
+    rate_terms: dict[int, CoefficientPart] = {}  # power of the rate, 2 or more -> N (s/m)^power
     displacement: str | None = None
     velocity: str | None = None
 
@@ -109,6 +111,11 @@ class ElementPart(Part):
     def _checks(self):
         if self.between[0] == self.between[1]:
             raise ValueError(f"between must name two different bodies, got {self.between[0]} twice")
+        if isinstance(self.unloading, CoefficientPart) and not (self.unloading.estimate and self.unloading.initial):
+            raise ValueError("unloading takes a number (known), or `estimate: true` with an `initial` value above 0")
+        for power in (*self.crush_terms, *self.rate_terms):
+            if not 2 <= power <= 9:
+                raise ValueError(f"crush_terms and rate_terms have powers from 2 to 9 (the first is stiffness, damping), got {power}")
         if self.velocity and not self.displacement:
             raise ValueError("`velocity` goes with `displacement`")
         return self
@@ -120,9 +127,15 @@ class ElementPart(Part):
             stiffness=self.stiffness.coefficient(),
             damping=self.damping.coefficient(),
             tension=self.tension != "none",
-            unloading=self.unloading,
+            unloading=self.unloading if isinstance(self.unloading, float) else None,
             displacement=self.displacement,
             velocity=self.velocity,
+            terms=tuple(
+                Term(of, power, part.coefficient())
+                for of, given in (("crush", self.crush_terms), ("rate", self.rate_terms))
+                for power, part in sorted(given.items())
+            ),
+            unloading_slope=self.unloading.coefficient() if isinstance(self.unloading, CoefficientPart) else None,
         )
 
 

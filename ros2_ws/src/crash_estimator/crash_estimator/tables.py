@@ -23,13 +23,13 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def parameter_table(description: Description, estimates: Sequence[Estimate]) -> str:
-    """Every parameter where its element carries most, with sigma and status, and that peak force."""
+    """Every parameter where its element carries most, with sigma and status, and that peak force; a mass at the end."""
     rows = []
     element_of = {name: k for k, name in enumerate(description.elements)}
     for k, (name, unit) in enumerate(zip(description.parameters, description.parameter_units)):
-        element = element_of[name.rsplit(".", 1)[0]]
-        peak = max(estimates, key=lambda estimate: abs(estimate.force[element]))
-        shown, factor = READABLE[unit]
+        element = element_of.get(name.rsplit(".", 1)[0])
+        peak = estimates[-1] if element is None else max(estimates, key=lambda estimate: abs(estimate.force[element]))
+        shown, factor = READABLE.get(unit, (unit, 1.0))
         known = ParameterStatus(peak.status[k]) == ParameterStatus.KNOWN
         rows.append(
             (
@@ -39,8 +39,8 @@ def parameter_table(description: Description, estimates: Sequence[Estimate]) -> 
                 shown,
                 ParameterStatus(peak.status[k]).name.lower(),
                 f"{peak.time_ns * 1e-6:.1f}",
-                f"{peak.crush[element] * 1e3:.0f}",
-                f"{peak.force[element] * 1e-3:.2f}",
+                "" if element is None else f"{peak.crush[element] * 1e3:.0f}",
+                "" if element is None else f"{peak.force[element] * 1e-3:.2f}",
             )
         )
     return table(("parameter at peak force", "value", "sigma", "unit", "status", "at ms", "crush mm", "force kN"), rows)

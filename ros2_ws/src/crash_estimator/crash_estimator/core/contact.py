@@ -7,7 +7,8 @@ down along the line from its peak,
 
 and climbs the same line again when it is reloaded. The known term Ku (X_peak - X) moves to the left side; K
 stays the secant stiffness of the peak, which every sample on the line still tells something about. An element
-without tension carries nothing where X <= 0, or where that line has come down to F = 0.
+without tension carries nothing where X <= 0, or where that line has come down to F = 0. Before the impact no
+element carries anything.
 """
 
 from typing import NamedTuple
@@ -19,8 +20,13 @@ from .kinematics import Motion
 from .structure import Structure
 
 
+REVERSAL = 0.02
+"""Share of the largest rate below which an elastic element's rate counts as noise, not as turning back."""
+
+
 class ContactState(NamedTuple):
     peak_crush: np.ndarray  # (e,) m, the largest so far, never below 0
+    peak_rate: np.ndarray  # (e,) m/s, the largest magnitude so far
     state: np.ndarray  # (e,) ElementState
 
 
@@ -39,28 +45,36 @@ class Contact:
     def __init__(self, structure: Structure):
         self.names = [element.name for element in structure.elements]
         self.compression_only = np.array([not element.tension for element in structure.elements], dtype=bool)
-        self.unloading = np.array([element.unloading or 0.0 for element in structure.elements])
+        slopes = [element.unloading_slope for element in structure.elements]  # of the estimated ones, at first
+        self.unloading = np.array([e.unloading or (s.value if s else 0.0) for e, s in zip(structure.elements, slopes)])
         self.plastic = self.unloading > 0.0
 
     def init(self) -> ContactState:
-        start = np.where(self.compression_only, ElementState.APART, ElementState.LOADING)
-        return ContactState(np.zeros(len(self.names)), start.astype(np.uint8))
+        n = len(self.names)
+        return ContactState(np.zeros(n), np.zeros(n), np.full(n, ElementState.APART, dtype=np.uint8))
 
     def step(
-        self, before: ContactState, motion: Motion, stiffness: np.ndarray
+        self, before: ContactState, motion: Motion, stiffness: np.ndarray, unloading: np.ndarray | None = None
     ) -> tuple[ContactState, SpringLaw, tuple[Event, ...]]:
-        """stiffness (e,): the latest known or estimated secant stiffness, N/m."""
+        """stiffness (e,): the latest known or estimated secant stiffness, N/m; unloading (e,) where it is estimated."""
+        if motion.time < 0.0:
+            nothing, none = np.zeros(len(self.names)), np.zeros(len(self.names), dtype=bool)
+            return before, SpringLaw(nothing, nothing, none, none), ()
         crush, peak = motion.crush, np.maximum(before.peak_crush, motion.crush)
         on_line = self.plastic & (crush < peak)
         lever = np.where(on_line, peak, crush)
-        shift = np.where(on_line, self.unloading * (crush - peak), 0.0)
+        slope = self.unloading if unloading is None else unloading
+        shift = np.where(on_line, slope * (crush - peak), 0.0)
         spent = on_line & (stiffness * lever + shift <= 0.0)
         apart = self.compression_only & ((crush <= 0.0) | spent)
-        unloads = np.where(self.plastic, on_line, motion.rate < 0.0)
+        peak_rate = np.maximum(before.peak_rate, np.abs(motion.rate))
+        still = np.abs(motion.rate) <= REVERSAL * peak_rate
+        turned = np.where(still, before.state == ElementState.UNLOADING, motion.rate < 0.0)
+        unloads = np.where(self.plastic, on_line, turned)
         state = np.where(apart, ElementState.APART, np.where(unloads, ElementState.UNLOADING, ElementState.LOADING))
         state = state.astype(np.uint8)
         law = SpringLaw(np.where(apart, 0.0, lever), np.where(apart, 0.0, shift), ~apart, on_line & ~apart)
-        return ContactState(peak, state), law, self._events(before.state, state, crush)
+        return ContactState(peak, peak_rate, state), law, self._events(before.state, state, crush)
 
     def _events(self, before: np.ndarray, after: np.ndarray, crush: np.ndarray) -> tuple[Event, ...]:
         if (before == after).all():

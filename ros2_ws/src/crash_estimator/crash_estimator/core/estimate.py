@@ -46,6 +46,7 @@ class Description(NamedTuple):
     between: tuple[tuple[str, str], ...]  # the two bodies of each element
     bodies: tuple[str, ...]
     masses: tuple[float, ...]  # kg, NaN where the model gives none (driven, fixed)
+    extra: tuple[str, ...] = ()  # what the method knows besides the parameters: "car.ar1", "model0.weight", ...
 
 
 class Estimate(NamedTuple):
@@ -71,6 +72,7 @@ class Estimate(NamedTuple):
     velocity: np.ndarray  # (b,) m/s
     acceleration: np.ndarray  # (b,) m/s^2, measured, zero offset removed; NaN where not measured
     events: tuple[Event, ...]
+    extra: tuple[float, ...] = ()  # the values of Description.extra, NaN until there are any
 
     @property
     def std(self) -> np.ndarray:

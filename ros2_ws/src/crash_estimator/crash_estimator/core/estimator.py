@@ -57,7 +57,13 @@ class Estimator:
             between=tuple(e.between for e in structure.elements),
             bodies=tuple(b.name for b in structure.bodies),
             masses=tuple(b.mass or float("nan") for b in structure.bodies),
+            extra=self._extra_names(),
         )
+
+    def _extra_names(self) -> tuple[str, ...]:
+        """What the method knows besides the parameters, such as a noise model; most methods nothing."""
+        names = getattr(self.method, "extra_names", None)
+        return names(tuple(self.structure.bodies[k].name for k in self.structure.equations)) if names else ()
 
     def init(self) -> State:
         p, q = len(self.description.parameters), len(self.description.equations)
@@ -68,16 +74,20 @@ class Estimator:
     def step(self, state: State, sample: Sample) -> tuple[State, Estimate]:
         """Fold one sample in; `state` is left as it was."""
         kinematics, motion = self.kinematics.step(state.kinematics, sample)
-        stiffness = state.update.theta[self.regressor.stiffness_index]
-        contact, law, events = self.contact.step(state.contact, motion, stiffness)
-        regression, forces = self.regressor.make(motion, law)
+        stiffness = self.regressor.secant(state.update.theta, state.contact.peak_crush)
+        unloading = self.regressor.unloading(state.update.theta)
+        contact, law, events = self.contact.step(state.contact, motion, stiffness, unloading)
+        regression, forces = self.regressor.make(motion, law, state.update.theta)
         method, update = state.method, state.update
         if motion.dt > 0.0 and self._excited(regression):
             method, update = self.method.update(method, regression)
             events += update.events + self._clamp_events(state.update.clamped, update)
         else:
             noise = np.diag(np.nan_to_num(regression.noise))
-            update = update._replace(clamped=np.zeros_like(update.clamped), innovation_covariance=noise, events=())
+            nothing = np.zeros_like(update.clamped)
+            update = update._replace(
+                clamped=nothing, innovation_covariance=noise, events=(), expected_error=(0.0, 0.0)
+            )
         dropped, drop_events = self._dropouts(state.dropped, motion)
         status = self.regressor.status(law, update.clamped)
         estimate = self._estimate(
@@ -119,8 +129,8 @@ class Estimator:
         status: np.ndarray,
         events: tuple[Event, ...],
     ) -> Estimate:
-        predicted = regression.known + regression.gradient @ update.theta
-        before = regression.known + regression.gradient @ theta_before
+        predicted = regression.known + regression.gradient @ update.theta + update.expected_error[1]
+        before = regression.known + regression.gradient @ theta_before + update.expected_error[0]
         # the part of the innovation that the update did not explain: R S^-1 R for an optimal gain, at most S
         spread = regression.gradient @ update.covariance @ regression.gradient.T
         residual_variance = np.maximum(np.diagonal(update.innovation_covariance) - np.diagonal(spread), 0.0)
@@ -145,4 +155,5 @@ class Estimator:
             velocity=motion.velocity,
             acceleration=motion.acceleration,
             events=events,
+            extra=update.extra or (float("nan"),) * len(self.description.extra),
         )

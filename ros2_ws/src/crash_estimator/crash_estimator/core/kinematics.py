@@ -19,6 +19,14 @@ RATE_SMOOTHING = 3e-4
 """s: time constant of the rate of crush where only the crush is measured (a difference alone is mostly noise)."""
 
 
+FEWEST = 20
+"""Pre-impact samples from which the sensors' noise is learnt."""
+
+
+RECORD = 0.05
+"""s: over a record of this length the noise's own mean is an offset as well; it adds to the error of the zero."""
+
+
 class Motion(NamedTuple):
     """What moves at one sample: b bodies, e elements, q equations."""
 
@@ -31,13 +39,15 @@ class Motion(NamedTuple):
     rate: np.ndarray  # (e,) m/s
     measured: np.ndarray  # (q,) left-hand side of each equation, NaN where not measured
     noise: np.ndarray  # (q,) variance of it before the impact: the sensors' noise; NaN where not known
+    offset_variance: np.ndarray  # (b,) (m/s^2)^2 by which the removed zero offset may be wrong; 0 where not known
 
 
 class KinematicState(NamedTuple):
     time_ns: int  # of the last sample after the impact; -1 before
     count: np.ndarray  # (channels,) pre-impact samples
     offset: np.ndarray  # (channels,) their mean: the zero offset
-    squares: np.ndarray  # (q,) sum of squared deviations of each equation's measurement before the impact
+    squares: np.ndarray  # (b,) sum of squared accelerations before the impact, their running mean removed
+    force_squares: np.ndarray  # (q,) the same of measured forces
     displacement: np.ndarray  # (b,)
     velocity: np.ndarray  # (b,)
     acceleration: np.ndarray  # (b,) the last valid one
@@ -83,9 +93,9 @@ class Kinematics:
     def init(self) -> KinematicState:
         channels, bodies = np.zeros(self.channel_count), np.zeros(len(self.structure.bodies))
         elements = np.zeros(len(self.structure.elements))
-        squares = np.zeros(len(self.structure.equations))
+        forces = np.zeros(len(self.structure.equations))
         return KinematicState(
-            -1, channels, channels, squares, self.initial_displacement, self.initial_velocity, bodies, elements, elements
+            -1, channels, channels, bodies, forces, self.initial_displacement, self.initial_velocity, bodies, elements, elements
         )
 
     def step(self, state: KinematicState, sample: Sample) -> tuple[KinematicState, Motion]:
@@ -105,17 +115,16 @@ class Kinematics:
             displacement = state.displacement + dt * state.velocity + dt * dt * (2.0 * last + now) / 6.0
             velocity = state.velocity + 0.5 * dt * (last + now)
         crush, rate = self._crush(state, values, displacement, velocity, dt)
-        motion = Motion(
-            sample.time, dt, displacement, velocity, acceleration, crush, rate,
-            self._measured(values, acceleration), self._noise(state),
-        )  # fmt: skip
+        measured = self._measured(values, acceleration)
         if before_impact:
-            return self._learn_noise(state, motion.measured)._replace(crush=crush, rate=rate), motion
-        return (
-            state._replace(
+            state = self._learn_noise(state, acceleration, measured)._replace(crush=crush, rate=rate)
+        else:
+            state = state._replace(
                 time_ns=sample.time_ns, displacement=displacement, velocity=velocity, acceleration=now, crush=crush, rate=rate
-            ),
-            motion,
+            )
+        noise, offset_variance = self._noise(state, dt)
+        return state, Motion(
+            sample.time, dt, displacement, velocity, acceleration, crush, rate, measured, noise, offset_variance
         )
 
     def _body_accelerations(self, values: np.ndarray) -> np.ndarray:
@@ -157,10 +166,19 @@ class Kinematics:
         change = np.where(valid, values - state.offset, 0.0) / np.maximum(count, 1.0)
         return state._replace(count=count, offset=state.offset + change)
 
-    def _learn_noise(self, state: KinematicState, measured: np.ndarray) -> KinematicState:
+    def _learn_noise(self, state: KinematicState, acceleration: np.ndarray, measured: np.ndarray) -> KinematicState:
         """Deviations from the running mean; the first samples' mean is poor, but their share fades as 1/n."""
-        return state._replace(squares=state.squares + np.nan_to_num(measured) ** 2)
+        return state._replace(
+            squares=state.squares + np.nan_to_num(acceleration) ** 2,
+            force_squares=state.force_squares + np.nan_to_num(measured) ** 2,
+        )
 
-    def _noise(self, state: KinematicState) -> np.ndarray:
+    def _noise(self, state: KinematicState, dt: float) -> tuple[np.ndarray, np.ndarray]:
+        """(q,) variance of each equation's measurement, and (b,) of the error of the zero offset that was removed."""
         count = state.count.max(initial=0.0)
-        return state.squares / count if count >= 20 else np.full_like(state.squares, np.nan)
+        if count < FEWEST:
+            return np.full_like(state.force_squares, np.nan), np.zeros_like(state.squares)
+        noise = state.force_squares / count
+        for row, body in self.balances:
+            noise[row] = state.squares[body] / count
+        return noise, state.squares / count * (1.0 / count + dt / RECORD)

@@ -1,44 +1,92 @@
 """The table of estimation methods."""
 
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
 from difflib import get_close_matches
+from typing import Any, NamedTuple, Protocol
 
-from crash_replay.recording import Test
+from crash_replay.recording import Sample, Test
 
+from .compiled.estimator import CompiledEstimator
+from .estimate import Description, Estimate
 from .estimator import Estimator, Method
+from .estimators.afmm import Afmm
+from .estimators.damping_later import DampingLater
+from .estimators.effective_mass import EffectiveMass, MassSettings
+from .estimators.gauss_newton import GaussNewton
 from .estimators.kalman import Kalman
+from .estimators.order_bank import OrderBank
 from .estimators.rls import Rls
-from .estimators.update import Theta, theta_settings
+from .estimators.update import theta_settings
 from .structure import ModelError, Structure
 
 
-def _mrls(settings: Theta, m: int = 5, **others) -> Rls:
-    return Rls(settings, m=m, **others)
+def elastic(structure: Structure) -> Structure:
+    """The same structure without the unloading lines: for a filter that knows nothing of loading and unloading."""
+    elements = tuple(replace(element, unloading=None, unloading_slope=None) for element in structure.elements)
+    return replace(structure, elements=elements)
 
 
-METHODS: dict[str, Callable[..., Method]] = {
-    "rls": Rls,
-    "mrls": _mrls,
-    "constrained_kalman": Kalman,
+class AnyEstimator(Protocol):
+    """What folds samples: `Estimator`, or one with equations of its own."""
+
+    description: Description
+
+    def init(self) -> Any: ...
+
+    def step(self, state: Any, sample: Sample) -> tuple[Any, Estimate]: ...
+
+
+def _masses(structure: Structure, test: Test, settings: MassSettings, name: str) -> AnyEstimator:
+    return EffectiveMass(structure, test, settings)
+
+
+class Recipe(NamedTuple):
+    """How a method is made: its class, where it differs from the class's defaults, and what it takes of a structure."""
+
+    kind: Callable[..., Any]
+    settings: dict[str, float | int | bool] = {}
+    structure: Callable[[Structure], Structure] = lambda structure: structure
+    estimator: Callable[[Structure, Test, Method, str], AnyEstimator] = Estimator
+
+
+METHODS: dict[str, Recipe] = {
+    "rls": Recipe(Rls),
+    "mrls": Recipe(Rls, {"m": 5}),
+    "kalman": Recipe(Kalman, {"constrained": False, "offsets": False}, elastic),
+    "constrained_kalman": Recipe(Kalman),
+    "gauss_newton": Recipe(GaussNewton),
+    "gauss_newton_orders": Recipe(OrderBank),
+    "afmm": Recipe(Afmm),
+    "effective_mass": Recipe(MassSettings, estimator=_masses),
 }
 
 
-def make_estimator(structure: Structure, test: Test, method: str, **settings) -> Estimator:
-    """An estimator of the structure's parameters on a test's channels.
+def make_estimator(
+    structure: Structure, test: Test, method: str, damping_after: float | None = None, compiled: bool = True, **settings
+) -> AnyEstimator:
+    """An estimator of the structure's parameters (effective_mass: of its masses) on a test's channels.
 
-    method: a key of METHODS; settings: fields of that method's dataclass, such as forgetting=0.98.
+    method: a key of METHODS; settings: fields of that method's dataclass, such as forgetting=0.98; damping_after: hold
+    each damping at its initial value until its element's stiffness is known to this share of its value; compiled: use
+    the compiled form where there is one (it agrees with the readable one but for rounding).
     Raises ModelError or RecordingError where the model does not fit the test, or a setting does not exist.
     """
     if method not in METHODS:
         near = get_close_matches(method, METHODS, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise ModelError(f"there is no method {method!r}, only {', '.join(METHODS)}{hint}")
-    kind = Kalman if METHODS[method] is Kalman else Rls
-    known = [f.name for f in fields(kind) if f.name != "settings"]
+    recipe = METHODS[method]
+    known = [f.name for f in fields(recipe.kind) if f.init and f.name != "settings"]
     for name in settings:
         if name not in known:
             near = get_close_matches(name, known, n=1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
             raise ModelError(f"method {method} has no setting {name!r}, only {', '.join(known)}{hint}")
-    return Estimator(structure, test, METHODS[method](theta_settings(structure), **settings), method)
+    structure = recipe.structure(structure)
+    chosen = recipe.kind(theta_settings(structure), **recipe.settings | settings)
+    if damping_after is not None and recipe.estimator is Estimator:
+        chosen = DampingLater(chosen, damping_after)
+    if compiled and structure.first_order and isinstance(chosen, (Rls, Kalman)):
+        return CompiledEstimator(structure, test, chosen, method)
+    return recipe.estimator(structure, test, chosen, method)

@@ -22,6 +22,9 @@ from crash_replay.recording import Test
 CONTACT_FREQUENCY = 30.0
 """rad/s: a quarter period of 50 ms, a crash's time scale; with a mass it gives a stiffness's order of magnitude."""
 
+TYPICAL_CRUSH, TYPICAL_RATE = 0.1, 5.0
+"""m, m/s: where a higher power is taken to be as large as the first, for its order of magnitude."""
+
 
 class ModelError(ValueError):
     """The model is at fault, or does not fit the test; the message is one readable line."""
@@ -58,6 +61,18 @@ class Coefficient:
 
 
 @dataclass(frozen=True)
+class Term:
+    """One more power of the crush or of its rate in an element's force (equation 4.1): coefficient sign(u) |u|^power.
+
+    u is X or V. The sign makes even powers pull in tension and take energy in both directions, as the odd ones do.
+    """
+
+    of: str  # "crush" or "rate"
+    power: int  # 2 or more
+    coefficient: Coefficient  # N/m^power, or N (s/m)^power
+
+
+@dataclass(frozen=True)
 class Element:
     """A spring and damper between two bodies."""
 
@@ -69,6 +84,8 @@ class Element:
     unloading: float | None = None  # known unloading stiffness, N/m; None: elastic
     displacement: str | None = None  # channel of the crush, instead of integrating accelerations
     velocity: str | None = None  # channel of the rate of crush; None: the crush's derivative
+    terms: tuple[Term, ...] = ()  # powers beyond the first
+    unloading_slope: Coefficient | None = None  # an unloading stiffness to be estimated, in place of a known one
 
 
 @dataclass(frozen=True)
@@ -81,6 +98,8 @@ class Parameter:
     is_stiffness: bool
     coefficient: Coefficient
     scale: float  # order of magnitude, for the initial standard deviation
+    power: int = 1  # of the crush or rate
+    is_unloading: bool = False  # the slope of the unloading line
 
 
 @dataclass(frozen=True)
@@ -100,6 +119,12 @@ class Structure:
                 raise ModelError(f"model {self.name}: body {body.name} is free and needs a mass > 0 kg")
             if not body.fixed and not body.acceleration:
                 raise ModelError(f"model {self.name}: body {body.name} names no channel for its motion")
+        for element in self.elements:
+            if element.unloading is not None and element.unloading_slope is not None:
+                raise ModelError(f"model {self.name}: element {element.name} has a known and an estimated unloading")
+            for term in element.terms:
+                if term.of not in ("crush", "rate") or term.power < 2:
+                    raise ModelError(f"model {self.name}: element {element.name}: a further power is 2 or more, got {term}")
         if not self.equations:
             raise ModelError(f"model {self.name} has no equation to fit: give a free body an acceleration channel")
 
@@ -138,7 +163,7 @@ class Structure:
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Stiffness and damping of every element, known ones included."""
+        """Stiffness and damping of every element, known ones included; then higher powers and estimated unloading."""
         found = []
         for k, element in enumerate(self.elements):
             mass = self._reduced_mass(k)
@@ -149,7 +174,29 @@ class Structure:
                 coefficient = getattr(element, kind)
                 scale = max(abs(coefficient.value), scale)
                 found.append(Parameter(f"{element.name}.{kind}", unit, k, kind == "stiffness", coefficient, scale))
-        return tuple(found)
+        return tuple(found) + tuple(self._further_parameters())
+
+    def _further_parameters(self) -> list[Parameter]:
+        found = []
+        for k, element in enumerate(self.elements):
+            mass = self._reduced_mass(k)
+            for term in element.terms:
+                spring, n = term.of == "crush", term.power
+                name = f"{element.name}.{'stiffness' if spring else 'damping'}{n}"
+                unit = f"N/m^{n}" if spring else f"N*(s/m)^{n}"
+                first = mass * CONTACT_FREQUENCY**2 if spring else mass * CONTACT_FREQUENCY
+                scale = max(abs(term.coefficient.value), first / (TYPICAL_CRUSH if spring else TYPICAL_RATE) ** (n - 1))
+                found.append(Parameter(name, unit, k, False, term.coefficient, scale, n))
+            if element.unloading_slope is not None:
+                slope = element.unloading_slope
+                scale = max(abs(slope.value), mass * CONTACT_FREQUENCY**2)
+                found.append(Parameter(f"{element.name}.unloading", "N/m", k, False, slope, scale, is_unloading=True))
+        return found
+
+    @property
+    def first_order(self) -> bool:
+        """Whether stiffness and damping of the first power, with known unloading, are all there is."""
+        return not any(element.terms or element.unloading_slope for element in self.elements)
 
     def _reduced_mass(self, element: int) -> float:
         """Of the two bodies of an element; a driven or fixed one counts as infinitely heavy."""

@@ -7,6 +7,11 @@ The process noise R1 follows the crush, because stiffness is a function of crush
 (drift theta)^2 for each e-fold of crush, and not at all while nothing moves. R2 starts from the noise
 before the impact (or the model's `noise`) and adapts:  E[residual innovation] = R2  holds for any gain that
 is optimal, so its running mean over `noise_memory` estimates what the model cannot follow as well.
+
+Crush is integrated twice from accelerations whose zero is known no better than the mean of n noisy samples, so
+that a stiff element's force is wrong by K b t^2 / 2. With `offsets` these errors b, one for each measured body, are
+considered (Schmidt): they have their part in P and in the gain, so that the parameters' covariance knows of them,
+but they are not estimated, because they would soak up whatever else the model lacks.
 """
 
 from dataclasses import dataclass
@@ -23,7 +28,7 @@ SMALLEST_SHARE = 0.05
 
 class KalmanState(NamedTuple):
     theta: np.ndarray  # (p,)
-    covariance: np.ndarray  # (p, p)
+    covariance: np.ndarray  # (p, p), or (p + b, p + b) once the offsets' errors have joined
     noise: np.ndarray  # (q,) variance of each equation's error, R2; NaN until the first update
 
 
@@ -34,40 +39,48 @@ class Kalman:
     settings: Theta
     constrained: bool = True  # keep the parameters' bounds
     noise_memory: float = 0.005  # s over which R2 adapts; 0 keeps the noise known before the impact
+    offsets: bool = True  # consider the errors of the zero offsets
 
     def init(self, equations: int) -> KalmanState:
         return KalmanState(self.settings.initial, np.diag(self.settings.std**2), np.full(equations, np.nan))
 
     def update(self, state: KalmanState, regression: Regression) -> tuple[KalmanState, Update]:
-        theta, noise = state.theta, self._noise(state, regression)
-        size = np.maximum(np.abs(theta), SMALLEST_SHARE * self.settings.scale)
-        prior = state.covariance + np.diag(regression.walk * size**2)
-        valid = ~np.isnan(regression.measured)
-        gradient, target = regression.gradient[valid], (regression.measured - regression.known)[valid]
-        r2 = np.diag(noise[valid])
+        theta, noise, p = state.theta, self._noise(state, regression), len(state.theta)
+        covariance, gradient = state.covariance, regression.gradient
+        if self.offsets:
+            if len(covariance) == p:
+                covariance = _with_offsets(covariance, regression.offset_variance)
+            gradient = np.hstack([gradient, regression.offset_gradient])
+        considered = np.ones(len(covariance) - p, dtype=bool)
+        prior = covariance + np.diag(self._walk(theta, regression, len(considered)))
+        target = regression.measured - regression.known
+        equations = [(psi, y, r) for psi, y, r in zip(gradient, target, noise) if not np.isnan(y)]
 
-        def gain(active: np.ndarray) -> np.ndarray:
-            psi = np.where(active, gradient, 0.0)
-            spread = prior @ psi.T
-            return np.where(active[:, None], np.linalg.solve(r2 + psi @ spread, spread.T).T, 0.0)
+        def assimilate(theta: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            """The equations' errors are independent, so they update in turn, each with a scalar to divide by."""
+            covariance = prior
+            seen, moved = np.concatenate([free, considered]), np.concatenate([free, ~considered])
+            for psi_all, y, r in equations:
+                psi = np.where(seen, psi_all, 0.0)
+                spread = covariance @ psi
+                gain = np.where(moved, spread / (r + psi @ spread), 0.0)
+                theta = theta + gain[:p] * (y - psi_all[:p] @ theta)
+                lessen = np.eye(len(prior)) - np.outer(gain, psi)
+                covariance = lessen @ covariance @ lessen.T + r * np.outer(gain, gain)
+            return theta, 0.5 * (covariance + covariance.T)
 
-        def solve(theta: np.ndarray, active: np.ndarray) -> np.ndarray:
-            return theta + gain(active) @ (target - gradient @ theta)
-
-        if self.constrained:
-            updated, clamped = within_bounds(solve, theta, regression.active, self.settings)
-        else:
-            updated, clamped = solve(theta, regression.active), np.zeros(len(theta), dtype=bool)
-        lessen = np.eye(len(theta)) - gain(regression.active & ~clamped) @ gradient
-        keep = gain(regression.active & ~clamped)
-        covariance = lessen @ prior @ lessen.T + keep @ r2 @ keep.T
-        covariance = 0.5 * (covariance + covariance.T)
-        innovation_covariance = np.diag(noise) + regression.gradient @ prior @ regression.gradient.T
-        products = (regression.measured - regression.known - regression.gradient @ updated) * (
-            regression.measured - regression.known - regression.gradient @ theta
-        )
+        bounds = self.settings if self.constrained else self.settings._replace(lower=-np.inf, upper=np.inf)
+        updated, clamped = within_bounds(lambda t, free: assimilate(t, free)[0], theta, regression.active, bounds)
+        held = np.where(clamped, updated, theta)
+        covariance = assimilate(held, regression.active & ~clamped)[1]
+        innovation_covariance = np.diag(noise) + gradient @ prior @ gradient.T
+        products = (target - regression.gradient @ updated) * (target - regression.gradient @ theta)
         state = KalmanState(updated, covariance, self._adapt(noise, products, regression))
-        return state, Update(updated, covariance, innovation_covariance, clamped)
+        return state, Update(updated, covariance[:p, :p], innovation_covariance, clamped)
+
+    def _walk(self, theta: np.ndarray, regression: Regression, extra: int) -> np.ndarray:
+        size = np.maximum(np.abs(theta), SMALLEST_SHARE * self.settings.scale)
+        return np.concatenate([regression.walk * size**2, np.zeros(extra)])
 
     def _noise(self, state: KalmanState, regression: Regression) -> np.ndarray:
         return np.where(np.isnan(state.noise), np.nan_to_num(regression.noise, nan=1.0), state.noise)
@@ -78,3 +91,11 @@ class Kalman:
         share = regression.dt / (regression.dt + self.noise_memory)
         adapted = noise + share * (np.where(np.isnan(products), noise, np.maximum(products, 0.0)) - noise)
         return np.fmax(adapted, regression.noise)
+
+
+def _with_offsets(covariance: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """Append the offsets' errors (b,), each with the variance learnt before the impact."""
+    p = len(covariance)
+    grown = np.diag(np.concatenate([np.zeros(p), variance]))
+    grown[:p, :p] = covariance
+    return grown

@@ -9,7 +9,8 @@ nothing would, and forgetting would inflate their covariance without bound.
 
 MRLS: where the moving mean of E over m samples leaves its limit, the index goes back by m and those samples
 are used again with the correction multiplied by cr, each step clipped to theta_lmt; theta, R and Lambda carry
-on. This is repeated until the mean is within its limit, or `rewinds` times.
+on. This is repeated until the mean is within its limit, or `rewinds` times. Figure 5.1 has no guard against a
+correction that overshoots; here a pass that leaves a larger mean than it found is taken back and ends the rewinding.
 """
 
 from dataclasses import dataclass
@@ -44,7 +45,7 @@ class Rls:
     forgetting: float | None = None  # lambda per sample; None: exp(-dt / memory)
     memory: float = 0.005  # s
     m: int = 0  # samples in the moving mean; 0: plain RLS
-    cr: float = 20.0  # multiplies the correction after a rewind
+    cr: float = 3.0  # multiplies the correction after a rewind
     step_limit: float = 0.05  # theta_lmt as a share of each parameter's scale
     error_limit: float = 2.58  # times the error's standard deviation over sqrt(m): 99 %
     rewinds: int = 10
@@ -117,22 +118,25 @@ class Rls:
         if len(state.window) < self.m:
             return state, clamped, ()
         limit = self.error_limit * np.sqrt(state.residual_variance / self.m)
-        passes = 0
-        while passes < self.rewinds and self._beyond(state.errors, limit).any():
-            errors = []
+        passes, excess = 0, self._excess(state.errors, limit)
+        while passes < self.rewinds and excess > 1.0:
+            again, errors, held = state, [], clamped
             for regression in state.window:
-                state, error, clamped = self._correct(state, regression, self.cr)
+                again, error, held = self._correct(again, regression, self.cr)
                 errors.append(error)
-            state = state._replace(errors=tuple(errors))
-            passes += 1
+            now = self._excess(tuple(errors), limit)
+            if now >= excess:  # the large correction has overshot: it is taken back
+                break
+            state, clamped, excess, passes = again._replace(errors=tuple(errors)), held, now, passes + 1
         if not passes:
             return state, clamped, ()
         steps = passes * self.m
         return state, clamped, (Event("rewound", "samples", float(steps), f"rewound {passes} x {self.m} samples"),)
 
     @staticmethod
-    def _beyond(errors: tuple[np.ndarray, ...], limit: np.ndarray) -> np.ndarray:
-        return np.abs(np.mean(np.nan_to_num(errors), axis=0)) > limit
+    def _excess(errors: tuple[np.ndarray, ...], limit: np.ndarray) -> float:
+        """The largest moving mean of the error over its limit; above 1 the parameters are taken to have changed."""
+        return float(np.max(np.abs(np.mean(np.nan_to_num(errors), axis=0)) / limit))
 
     def _learn_residual(self, state: RlsState, regression: Regression) -> RlsState:
         residual = regression.measured - regression.known - regression.gradient @ state.theta

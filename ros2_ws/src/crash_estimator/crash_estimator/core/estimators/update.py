@@ -28,6 +28,9 @@ class Update(NamedTuple):
     innovation_covariance: np.ndarray  # (q, q)
     clamped: np.ndarray  # (p,) held at a bound in this step
     events: tuple[Event, ...] = ()
+    expected_error: tuple[np.ndarray | float, np.ndarray | float] = (0.0, 0.0)
+    # (q,) each: the error that a noise model expected, with theta before and after the update
+    extra: tuple[float, ...] = ()  # what the method knows besides theta, named by its `extra_names`
 
 
 def theta_settings(structure: Structure) -> Theta:

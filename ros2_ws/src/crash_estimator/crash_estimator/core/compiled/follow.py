@@ -1,0 +1,91 @@
+"""One sample, or a whole record, through the compiled recursion."""
+
+import numpy as np
+from numba import njit
+
+from ..estimate import ParameterStatus
+from .kalman import kalman_step
+from .motion import APART, UNLOADING, move, regress, touch
+from .rls import rls_step
+from .views import row_views, state_views
+
+ESTIMATED, KNOWN, UNLOADS, SEPARATE, CLAMPED = (float(status) for status in ParameterStatus)
+
+
+@njit(cache=True)
+def follow(plan, method, n, state, times_ns, values, rows):
+    """Fold (k, c) values at (k,) times through the method; `state` is changed in place, (k, row) `rows` are filled."""
+    s = state_views(state, n)
+    p, q, e = n.estimated, n.equations, n.elements
+    per_offset = np.zeros((e, n.offsets))
+    clean, bodies = np.empty(n.channels), np.empty(n.bodies)
+    lever, shift, per_unit = np.empty(e), np.empty(e), np.empty(n.parameters)
+    known, gradient, learnt, target = np.empty(q), np.empty((q, p + n.offsets)), np.empty(q), np.empty(q)
+    active, walk, clamped, before = np.empty(p), np.empty(p), np.empty(p), np.empty(p)
+    for t in range(len(times_ns)):
+        row = row_views(rows[t], n)
+        time = times_ns[t] * 1e-9
+        dt = move(plan, s, row, times_ns[t], values[t], clean, bodies)
+        touch(plan, s, row, time, lever, shift)
+        excited = regress(
+            plan, s, row, n, dt, time, lever, shift, per_unit, per_offset, known, gradient, active, walk, learnt
+        )
+        before[:] = s.theta
+        clamped[:] = 0.0
+        row.rewinds[0] = 0.0
+        if dt > 0.0 and excited:
+            if method.is_kalman:
+                kalman_step(plan, method, n, s, row, dt, known, gradient, active, walk, learnt, target, clamped)
+            else:
+                rls_step(plan, method, s, row, dt, known, gradient, active, walk, learnt, target, clamped)
+        else:
+            row.innovation_covariance[:, :] = 0.0
+            for i in range(q):
+                row.innovation_covariance[i, i] = learnt[i] if learnt[i] == learnt[i] else 0.0
+        _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped)
+
+
+@njit(cache=True)
+def _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped):
+    """Write the estimate: what the parameters now predict, and how sure that is."""
+    p, q = len(s.theta), len(known)
+    for j in range(len(per_unit)):
+        k, slot = plan.element[j], plan.slot[j]
+        if slot < 0:
+            row.parameters[j], row.std[j], row.status[j] = plan.value[j], 0.0, KNOWN
+            continue
+        row.parameters[j] = s.theta[slot]
+        row.std[j] = np.sqrt(s.covariance[slot, slot])
+        status = ESTIMATED
+        if row.state[k] == APART:
+            status = SEPARATE
+        elif clamped[slot]:
+            status = CLAMPED
+        elif plan.is_stiffness[j] and plan.unloading[k] > 0.0 and row.state[k] == UNLOADING:
+            status = UNLOADS
+        row.status[j] = status
+    row.covariance[:, :] = s.covariance[: n.estimated, : n.estimated]
+    for i in range(q):
+        predicted = expected = known[i]
+        spread = 0.0
+        for j in range(p):
+            predicted += gradient[i, j] * s.theta[j]
+            expected += gradient[i, j] * before[j]
+            for h in range(p):
+                spread += gradient[i, j] * s.covariance[j, h] * gradient[i, h]
+        row.predicted[i] = predicted
+        row.innovation[i] = row.measured[i] - expected
+        row.residual[i] = row.measured[i] - predicted
+        row.innovation_std[i] = np.sqrt(row.innovation_covariance[i, i])
+        row.residual_std[i] = np.sqrt(max(row.innovation_covariance[i, i] - spread, 0.0))
+    for k in range(len(shift)):
+        row.force[k] = shift[k]
+        row.force_std[k] = 0.0
+    for j in range(len(per_unit)):
+        k, slot = plan.element[j], plan.slot[j]
+        row.force[k] += per_unit[j] * row.parameters[j]
+        for h in range(len(per_unit)):
+            if slot >= 0 and plan.element[h] == k and plan.slot[h] >= 0:
+                row.force_std[k] += per_unit[j] * s.covariance[slot, plan.slot[h]] * per_unit[h]
+    for k in range(len(shift)):
+        row.force_std[k] = np.sqrt(max(row.force_std[k], 0.0))

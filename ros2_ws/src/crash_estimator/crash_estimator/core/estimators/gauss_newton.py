@@ -1,0 +1,201 @@
+"""Recursive Gauss-Newton with an ARMA(p, q) model of each equation's error (thesis 4.10, 4.12).
+
+    D(B) e_t = A(B) eps_t,    D = 1 + d_1 B + ... + d_p B^p,    A = 1 + a_1 B + ... + a_q B^q
+    e_t = y - psi theta,      eps_t = e_t + sum d_i e_{t-i} - sum a_j eps_{t-j}
+
+B delays by one sample, eps is the one-step prediction error, p and q may differ from equation to equation. The
+past e are those of the current theta, the past eps those after their update. Then the gradient is exact:
+
+    Psi = -d eps/d theta:  Psi_t = psi_t + sum d_i psi_{t-i} - sum a_j Psi_{t-j}
+    for d_i:               Psi_t = -e_{t-i} - sum a_j Psi_{t-j}
+    for a_j:               Psi_t = eps_{t-j} - sum a_l Psi_{t-l}
+
+theta, d and a go through the recursion of RLS together, with Psi in place of psi; with p = q = 0 it is RLS. The
+roots of D and A are kept within `LARGEST_ROOT`: a stationary error, and a predictor that forgets.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..regression import Regression
+from ..structure import ModelError
+from .rls import Rls, RlsState
+from .update import Theta, Update
+
+LARGEST_ROOT = 0.98
+"""Of D and A, in modulus: at 1 the noise model would integrate, beyond it the predictor diverges."""
+
+COEFFICIENT_STD = 0.5
+"""Of the coefficients d and a before the first sample; they start from 0, white noise."""
+
+LONGEST = 100
+"""Orders above this are a mistake in the settings."""
+
+
+class Past(NamedTuple):
+    """One sample as the noise model remembers it: q equations, p parameters, n with d and a."""
+
+    target: np.ndarray  # (q,) measured minus known, NaN where not measured
+    gradient: np.ndarray  # (q, p) psi
+    error: np.ndarray  # (q,) eps after the update, 0 where not measured
+    filtered: np.ndarray  # (q, n) Psi
+
+
+class GaussNewtonState(NamedTuple):
+    rls: RlsState  # of theta, then d and a of each equation in turn
+    past: tuple[Past, ...]  # the latest first
+
+
+class NoiseModel(NamedTuple):
+    """D(B) e = A(B) eps of one equation."""
+
+    d: np.ndarray  # (p,)
+    a: np.ndarray  # (q,)
+    covariance: np.ndarray  # (p + q, p + q) of d and a
+    variance: float  # of eps, (m/s^2)^2 or N^2
+
+
+@dataclass(frozen=True)
+class GaussNewton:
+    """Settings of the method."""
+
+    settings: Theta
+    p: int | tuple[int, ...] = 1  # autoregressive order, one for all equations or one each
+    q: int | tuple[int, ...] = 2  # moving-average order
+    forgetting: float | None = None  # as in RLS
+    memory: float = 0.005  # s, as in RLS
+    noise_memory: float = 0.1  # s: of d and a, which are those of the whole record
+
+    def __post_init__(self):
+        for name in ("p", "q"):
+            orders = getattr(self, name)
+            for order in orders if isinstance(orders, tuple) else (orders,):
+                if isinstance(order, bool) or not isinstance(order, int) or not 0 <= order <= LONGEST:
+                    raise ModelError(f"order {name} of gauss_newton must be a whole number from 0 to {LONGEST}, got {order!r}")
+
+    def orders(self, equations: int) -> list[tuple[int, int]]:
+        """(p, q) of each equation."""
+        p, q = ((o,) * equations if isinstance(o, int) else o for o in (self.p, self.q))
+        if len(p) != equations or len(q) != equations:
+            raise ModelError(f"gauss_newton needs one order for each of {equations} equations, got p {p} and q {q}")
+        return list(zip(p, q))
+
+    def extra_names(self, equations: tuple[str, ...]) -> tuple[str, ...]:
+        """Names of `Update.extra`: the coefficients d ("ar") and a ("ma") of each equation."""
+        named = zip(equations, self.orders(len(equations)))
+        return tuple(
+            f"{name}.{kind}{i + 1}" for name, (p, q) in named for kind, n in (("ar", p), ("ma", q)) for i in range(n)
+        )
+
+    def init(self, equations: int) -> GaussNewtonState:
+        return GaussNewtonState(self._rls(equations).init(equations), ())
+
+    def update(self, state: GaussNewtonState, regression: Regression) -> tuple[GaussNewtonState, Update]:
+        equations, parameters = regression.gradient.shape
+        expected, filtered = self._predict(state.rls.theta, state.past, regression)
+        theta, n = state.rls.theta[:parameters], filtered.shape[1]
+        linear = regression.gradient @ theta - filtered @ state.rls.theta
+        wide = regression._replace(
+            known=regression.known + linear + expected,
+            gradient=filtered,
+            active=np.concatenate([regression.active, np.ones(n - parameters, dtype=bool)]),
+            walk=np.concatenate([regression.walk, np.zeros(n - parameters)]),
+        )
+        rls, update = self._rls(equations).update(self._remembered(state.rls, regression.dt), wide)
+        rls = rls._replace(theta=self._stable(rls.theta, equations))
+        expected_after, _ = self._predict(rls.theta, state.past, regression)
+        target = regression.measured - regression.known
+        error = np.nan_to_num(target - regression.gradient @ rls.theta[:parameters] - expected_after)
+        longest = max(max(order) for order in self.orders(equations))
+        past = (Past(target, regression.gradient, error, filtered), *state.past)[:longest]
+        update = update._replace(
+            theta=rls.theta[:parameters],
+            covariance=update.covariance[:parameters, :parameters],
+            clamped=update.clamped[:parameters],
+            expected_error=(expected, expected_after),
+            extra=tuple(rls.theta[parameters:].tolist()),
+        )
+        return GaussNewtonState(rls, past), update
+
+    def _remembered(self, state: RlsState, dt: float) -> RlsState:
+        """Information on d and a so much larger that the forgetting of RLS leaves what `noise_memory` leaves."""
+        count, p = len(state.theta), len(self.settings.initial)
+        if count == p:
+            return state
+        forgetting = self.forgetting if self.forgetting is not None else float(np.exp(-dt / self.memory))
+        keep = np.ones(count)
+        keep[p:] = np.sqrt(float(np.exp(-dt / self.noise_memory)) / forgetting)
+        return state._replace(
+            information=keep[:, None] * state.information * keep, spread=keep[:, None] ** 2 * state.spread * keep**2
+        )
+
+    def noise_models(self, state: GaussNewtonState) -> list[NoiseModel]:
+        """The noise model of each equation, as known after the last sample."""
+        equations = len(state.rls.residual_variance)
+        covariance = self._rls(equations)._covariance(state.rls)
+        return [
+            NoiseModel(state.rls.theta[d], state.rls.theta[a], covariance[d.start : a.stop, d.start : a.stop], float(v))
+            for (d, a), v in zip(self._slices(equations), state.rls.residual_variance)
+        ]
+
+    def _predict(
+        self, theta: np.ndarray, past: tuple[Past, ...], regression: Regression
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(q,) the error that the noise model expects, and (q, n) Psi, both for theta (n,) with its d and a."""
+        equations, parameters = regression.gradient.shape
+        expected, filtered = np.zeros(equations), np.zeros((equations, len(theta)))
+        filtered[:, :parameters] = regression.gradient
+        for k, (d, a) in enumerate(self._slices(equations)):
+            for i, then in zip(range(d.start, d.stop), past):
+                error = np.nan_to_num(then.target[k] - then.gradient[k] @ theta[:parameters])
+                expected[k] -= theta[i] * error
+                filtered[k, :parameters] += theta[i] * then.gradient[k] * ~np.isnan(then.target[k])
+                filtered[k, i] -= error
+            for j, then in zip(range(a.start, a.stop), past):
+                expected[k] += theta[j] * then.error[k]
+                filtered[k, j] += then.error[k]
+            for j, then in zip(range(a.start, a.stop), past):
+                filtered[k] -= theta[j] * then.filtered[k]
+        return expected, filtered
+
+    def _slices(self, equations: int) -> list[tuple[slice, slice]]:
+        """Where each equation's d and a stand in theta."""
+        start, found = len(self.settings.initial), []
+        for p, q in self.orders(equations):
+            found.append((slice(start, start + p), slice(start + p, start + p + q)))
+            start += p + q
+        return found
+
+    def _stable(self, theta: np.ndarray, equations: int) -> np.ndarray:
+        theta = theta.copy()
+        for d, a in self._slices(equations):
+            theta[d], theta[a] = stable(theta[d]), stable(theta[a])
+        return theta
+
+    def _rls(self, equations: int) -> Rls:
+        count = sum(p + q for p, q in self.orders(equations))
+        s, more = self.settings, np.ones(count)
+        wide = Theta(
+            s.names + ("",) * count,
+            np.concatenate([s.initial, 0.0 * more]),
+            np.concatenate([s.std, COEFFICIENT_STD * more]),
+            np.concatenate([s.lower, -np.inf * more]),
+            np.concatenate([s.upper, np.inf * more]),
+            np.concatenate([s.scale, more]),
+        )
+        return Rls(wide, forgetting=self.forgetting, memory=self.memory)
+
+
+def stable(coefficients: np.ndarray) -> np.ndarray:
+    """Coefficients c of 1 + c_1 B + ... with every root r of z^n + c_1 z^(n-1) + ... at most LARGEST_ROOT in modulus.
+
+    All roots are drawn in by the same factor f, which multiplies c_i by f^i and keeps the shape of the spectrum.
+    """
+    if not len(coefficients) or np.abs(coefficients).sum() < LARGEST_ROOT ** len(coefficients):
+        return coefficients  # by Rouche's theorem all roots are within
+    largest = np.abs(np.roots(np.concatenate([[1.0], coefficients]))).max()
+    if largest <= LARGEST_ROOT:
+        return coefficients
+    return coefficients * (LARGEST_ROOT / largest) ** np.arange(1, len(coefficients) + 1)
