@@ -1,0 +1,80 @@
+"""Every command in the README is run here as it stands; `make test` is the one that runs this."""
+
+import os
+import re
+import shlex
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text()
+COMMANDS = [line for block in re.findall(r"```sh\n(.*?)```", README, re.S) for line in block.splitlines() if line]
+LISTENING = [c for c in COMMANDS if "crash_estimator viewer" in c or "crash_estimator estimator" in c]
+REPLAY = [c for c in COMMANDS if "crash_replay replay" in c]
+ALONE = [c for c in COMMANDS if c not in ("make test", *LISTENING, *REPLAY)]
+
+
+def environment(domain: int) -> dict[str, str]:
+    """Of a new user without a display, on a ROS domain of the test's own."""
+    kept = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", "MAKEFLAGS", "MAKELEVEL")}
+    return kept | {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+
+
+def needs_data(command: str) -> None:
+    for word in re.findall(r"\.\./shared/data/\S+", command):
+        if not (ROOT / word).exists():
+            pytest.skip(f"{word} is not beside the project")
+
+
+def test_the_first_two_commands_do_everything():
+    assert COMMANDS[:2] == ["make demo", "make test"]
+    assert "make test" in (ROOT / ".ci" / "run").read_text()
+
+
+@pytest.mark.parametrize("command", ALONE)
+def test_a_command_runs_as_it_stands(command):
+    needs_data(command)
+    if "out/camry.mcap --model" in command:  # goes on with what the import before it has written
+        subprocess.run(shlex.split(ALONE[ALONE.index(command) - 1]), cwd=ROOT, check=True, capture_output=True)
+    done = subprocess.run(
+        shlex.split(command), cwd=ROOT, env=environment(71), capture_output=True, text=True, timeout=240
+    )
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    assert "Traceback" not in done.stderr
+
+
+def test_the_three_nodes_find_each_other(tmp_path):
+    assert len(LISTENING) == 2 and len(REPLAY) == 1
+    written = ROOT / "out" / "dummy.rrd"
+    written.unlink(missing_ok=True)
+    written.parent.mkdir(exist_ok=True)
+    logs = [open(tmp_path / f"{k}.log", "w+") for k in range(2)]
+    nodes = [
+        subprocess.Popen(shlex.split(c), cwd=ROOT, env=environment(72), stdout=log, stderr=log)
+        for c, log in zip(LISTENING, logs)
+    ]
+    try:
+        replay = subprocess.run(
+            [*shlex.split(REPLAY[0]), "-p", "wait_timeout:=120.0"],
+            cwd=ROOT, env=environment(72), capture_output=True, text=True, timeout=200,
+        )  # fmt: skip
+        assert replay.returncode == 0, replay.stdout + replay.stderr
+        assert "1201 samples sent" in replay.stdout
+    finally:
+        for node in nodes:
+            node.terminate()
+        statuses = [node.wait(30) for node in nodes]
+    for log in logs:
+        log.seek(0)
+        text = log.read()
+        log.close()
+        assert "Traceback" not in text and "not seen" not in text, text
+    assert statuses == [0, 0]
+    assert written.stat().st_size > 100_000
+
+
+@pytest.mark.parametrize("name", sorted(set(re.findall(r"`(ros2_ws/src/[\w/]+|bags/[\w.]+)`", README))))
+def test_every_path_that_is_named_is_there(name):
+    assert (ROOT / name).exists()
