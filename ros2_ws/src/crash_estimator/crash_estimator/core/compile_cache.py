@@ -1,4 +1,4 @@
-"""Where numba keeps its compiled code: a folder of its own for every state of the core's sources.
+"""Where numba keeps its compiled code: a folder of its own for every state of the sources it is made of.
 
 numba looks only at the file of a cached function, not at the functions and constants it takes from other
 files: after an update it would go on running old code. Import this before defining a compiled function.
@@ -11,8 +11,12 @@ from pathlib import Path
 from numba import config
 
 
+INDEPENDENT = {"diagnosis", "effects"}
+"""Folders of the core that the compiled recursion takes nothing from."""
+
+
 def _fingerprint(folder: Path) -> str:
-    sources = sorted(folder.rglob("*.py"))
+    sources = sorted(path for path in folder.rglob("*.py") if not INDEPENDENT & set(path.relative_to(folder).parts))
     return hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
 
 
