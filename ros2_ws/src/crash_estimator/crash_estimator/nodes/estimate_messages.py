@@ -1,7 +1,7 @@
-"""Estimates -> crash_msgs: the one file of the estimator that knows both worlds."""
+"""Estimates -> crash_msgs and back: the one file of the estimator that knows both worlds."""
 
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -60,6 +60,81 @@ class EstimateMessages:
         message.time_ns = array("q", [estimate.time_ns for estimate in estimates])
         message.model = self.description.model
         message.method = self.description.method
+
+
+def description_from(parameters: Parameters, residuals: Residuals, forces: Forces) -> Description:
+    """Names and units from one message of each kind."""
+    bodies = tuple(forces.body)
+    return Description(
+        model=parameters.model,
+        method=parameters.method,
+        parameters=tuple(parameters.name),
+        parameter_units=tuple(parameters.unit),
+        equations=tuple(residuals.name),
+        equation_units=tuple(residuals.unit),
+        elements=tuple(forces.element),
+        between=tuple(_ends(between, bodies) for between in forces.between),
+        bodies=bodies,
+        masses=tuple(forces.mass),
+    )
+
+
+def estimates_from(
+    parameters: Sequence[Parameters], residuals: Sequence[Residuals], forces: Sequence[Forces]
+) -> list[Estimate]:
+    """The samples that all three kinds of message tell of, in order, without events.
+
+    Of the covariances only the diagonals travel: all else in them is NaN.
+    """
+    by_kind = [
+        {number: row for m in messages for number, row in _samples(m)} for messages in (parameters, residuals, forces)
+    ]
+    estimates = []
+    for number in sorted(set.intersection(*(set(rows) for rows in by_kind))):
+        p, r, f = (rows[number] for rows in by_kind)
+        estimates.append(
+            Estimate(
+                number=number,
+                time_ns=p["time_ns"],
+                parameters=p["value"],
+                covariance=_diagonal(p["std"]),
+                status=p["status"],
+                innovation_covariance=_diagonal(r["innovation_std"]),
+                **{field: r[field] for field in ("measured", "predicted", "innovation", "residual", "residual_std")},
+                **{field: f[field] for field in ("crush", "rate", "force", "force_std", "state")},
+                **{field: f[field] for field in ("displacement", "velocity", "acceleration")},
+                events=(),
+            )
+        )
+    return estimates
+
+
+FIELDS = {
+    Parameters: ("value", "std", "status"),
+    Residuals: ("measured", "predicted", "innovation", "innovation_std", "residual", "residual_std"),
+    Forces: ("crush", "rate", "force", "force_std", "state", "displacement", "velocity", "acceleration"),
+}
+"""Those with one row a sample."""
+
+
+def _samples(message: Parameters | Residuals | Forces) -> Iterator[tuple[int, dict]]:
+    """(number, fields) of each sample of a block."""
+    n = len(message.time_ns)
+    tables = {field: np.asarray(getattr(message, field)).reshape(n, -1) for field in FIELDS[type(message)]}
+    for k in range(n):
+        yield message.number + k, {"time_ns": message.time_ns[k]} | {field: rows[k] for field, rows in tables.items()}
+
+
+def _diagonal(std: np.ndarray) -> np.ndarray:
+    matrix = np.full((len(std), len(std)), np.nan)
+    np.fill_diagonal(matrix, std**2)
+    return matrix
+
+
+def _ends(between: str, bodies: tuple[str, ...]) -> tuple[str, str]:
+    """The two bodies of "body_a-body_b", where a name may have a hyphen itself."""
+    pairs = ((a, b) for a in bodies for b in bodies if f"{a}-{b}" == between)
+    return next(pairs, (between, ""))
 
 
 def _rows(estimates: Sequence[Estimate], field: str) -> array:

@@ -1,0 +1,151 @@
+"""`viewer`: shows what the estimators say in Rerun, live, and writes it to a .rrd file.
+
+Subscribes to `test`, `replay_state` and each estimator's `parameters`, `residuals`, `forces` and `events`. Callbacks
+only queue what comes; decoding, drawing and waiting for a slow screen happen in the recorder's own thread.
+"""
+
+import os
+import sys
+import time
+from collections.abc import Callable, Hashable
+from functools import partial
+
+import rclpy
+from crash_msgs.msg import ReplayState, Samples, TestInfo
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.exceptions import ParameterException
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+from rclpy.subscription import Subscription
+from rclpy.task import Future
+
+from crash_replay.qos import LATCHED, STREAM
+from crash_replay.ros_runtime import acknowledge_promptly, spin
+
+from ..viewer.native import has_display, open_viewer
+from ..viewer.recorder import Recorder
+from ..viewer.sinks import Sinks
+from .viewer_messages import BLOCK_OF, test_block
+
+QUIET = 3.0
+"""s without a message after which a finished replay counts as shown, though samples are missing."""
+
+SETTLED = 0.3
+"""s for which all publishers must have been there: they hear of their subscriber a little later than it of them."""
+
+
+class ViewerNode(Node):
+    def __init__(self) -> None:
+        super().__init__("viewer")
+        say = self.get_logger().info
+        self.estimators = [n for n in self._declared("estimators", [""], "names of estimators; empty: all there are") if n]
+        port = self._declared("port", 9876, "of the gRPC server on 127.0.0.1 that viewers connect to")
+        rrd = self._declared("rrd", "crash.rrd", "file that the recording is written to; empty: none")
+        memory = self._declared("memory_limit", "1GiB", "what the server keeps for viewers that come late")
+        wants_window = self._declared("open", True, "open the native viewer where there is a display")
+        self.exits = self._declared("exit_when_finished", False, "end with the replay")
+        sinks = Sinks(port, rrd, memory)
+        if sinks.port != port:
+            say(f"port {port} is in use, taking {sinks.port}")
+        if wants_window and has_display():
+            open_viewer(sinks.url)
+            say(f"viewer opened on {sinks.url}")
+        else:
+            say(f"look at it live with: rerun --connect {sinks.url}")
+        if sinks.rrd:
+            say(f"writing {sinks.rrd}")
+        os.nice(10)  # after the window is open: on a busy machine the estimators go first, the picture comes later
+        self.recorder = Recorder(sinks, tuple(self.estimators), say=self.get_logger().warning)
+        self.done = Future()
+        self.finished = False
+        self.counted: Subscription | None = None
+        self.replay_goes_on = False
+        self.followed: set[str] = set()
+        self.inputs: list[Subscription] = []
+        self.heard_since = time.monotonic()
+        self.create_subscription(TestInfo, "test", self._on_test, LATCHED)
+        self.create_subscription(ReplayState, "replay_state", self._on_state, LATCHED)
+        for name in self.estimators:
+            self._follow(name)
+        self.create_timer(0.1, self._look_around)
+
+    def _declared(self, name: str, default, description: str):
+        return self.declare_parameter(name, default, ParameterDescriptor(description=description)).value
+
+    def _follow(self, name: str) -> None:
+        self.followed.add(name)
+        for topic, (kind, make) in BLOCK_OF.items():
+            queue = partial(self._queue, name, kind, make, None if topic == "events" else (name, topic))
+            self.inputs.append(self.create_subscription(kind, f"{name}/{topic}", queue, STREAM, raw=True))
+
+    def _queue(self, name: str, kind: type, make: Callable, stream: Hashable, raw: bytes) -> None:
+        self.recorder.put(lambda: make(name, deserialize_message(raw, kind)), stream)
+
+    def _on_test(self, message: TestInfo) -> None:
+        self.recorder.put(partial(test_block, message))
+
+    def _on_state(self, message: ReplayState) -> None:
+        self.finished = message.state == ReplayState.FINISHED
+
+    def _look_around(self) -> None:
+        """Find estimators, let a waiting replay count this viewer, and end with the replay when asked to."""
+        if not self.estimators:
+            for name in sorted(self._estimators_around() - self.followed):
+                self._follow(name)
+        self._be_counted()
+        quiet = time.monotonic() - self.recorder.last_put > QUIET
+        if self.exits and self.finished and self.recorder.idle and (self.recorder.complete or quiet):
+            self.done.set_result(None)
+
+    def _estimators_around(self) -> set[str]:
+        own = self.get_namespace().rstrip("/") + "/"
+        kind = "crash_msgs/msg/Residuals"
+        topics = [topic for topic, kinds in self.get_topic_names_and_types() if kind in kinds]
+        return {topic.removeprefix(own).removesuffix("/residuals") for topic in topics if topic.endswith("/residuals")}
+
+    def _be_counted(self) -> None:
+        """Subscribe to `samples` once all estimators can be heard, until the first sample.
+
+        A replay that waits for one subscriber more than there are estimators so begins when they can be seen.
+        """
+        if self.replay_goes_on:
+            if self.counted:
+                self.destroy_subscription(self.counted)
+                self.counted = None
+        elif self.counted is None and self.inputs:
+            if not all(subscription.get_publisher_count() for subscription in self.inputs):
+                self.heard_since = time.monotonic()
+            elif time.monotonic() - self.heard_since > SETTLED:
+                self.counted = self.create_subscription(Samples, "samples", self._on_first_sample, STREAM, raw=True)
+
+    def _on_first_sample(self, _raw: bytes) -> None:
+        self.replay_goes_on = True
+
+
+def main() -> int:
+    acknowledge_promptly()
+    rclpy.init()
+    try:
+        node = ViewerNode()
+    except (OSError, ParameterException) as error:
+        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
+        rclpy.try_shutdown()
+        return 1
+    executor = EventsExecutor()
+    executor.add_node(node)
+    try:
+        spin(executor, until=node.done)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        for line in node.recorder.close():
+            print(line, flush=True)
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,122 @@
+"""Who is on stage: the test, and what each estimator calls its parameters, equations, elements and bodies.
+
+The layout and every drawing follow from the cast alone, so that several models and methods come side by
+side: what has the same name shares a plot, and each estimator keeps its colour everywhere.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.estimate import ParameterStatus
+from .blocks import ForceBlock, ParameterBlock, ResidualBlock, TestBlock
+from .units import Shown, shown
+
+Color = tuple[int, int, int]
+
+MEASURED: Color = (205, 205, 205)
+ESTIMATOR_COLORS: tuple[Color, ...] = (
+    (255, 140, 40),  # orange
+    (70, 165, 255),  # blue
+    (90, 210, 110),  # green
+    (235, 110, 205),  # pink
+    (245, 220, 70),  # yellow
+    (165, 135, 255),  # violet
+)
+
+LIGHT = 10.0
+"""kg: where no body is heavier, a kN is far too much."""
+
+
+class Member(NamedTuple):
+    """One estimator's names."""
+
+    name: str
+    model: str
+    method: str
+    parameters: tuple[tuple[str, str], ...]  # (name, unit) of those that are estimated
+    equations: tuple[tuple[str, str], ...]  # (name, unit)
+    elements: tuple[str, ...]
+    between: tuple[tuple[str, str], ...]
+    bodies: tuple[str, ...]
+    masses: tuple[float | None, ...]  # kg, None where the model gives none (driven, fixed)
+
+
+def member(parameters: ParameterBlock, residuals: ResidualBlock, forces: ForceBlock) -> Member:
+    """An estimator's names from its first block of each kind."""
+    estimated = (parameters.status[0] != ParameterStatus.KNOWN).tolist()
+    pairs = zip(parameters.name, parameters.unit)
+    return Member(
+        name=parameters.estimator,
+        model=parameters.model,
+        method=parameters.method,
+        parameters=tuple(pair for pair, shown in zip(pairs, estimated) if shown),
+        equations=tuple(zip(residuals.name, residuals.unit)),
+        elements=forces.element,
+        between=tuple(_ends(between, forces.body) for between in forces.between),
+        bodies=forces.body,
+        masses=tuple(None if np.isnan(mass) else float(mass) for mass in forces.mass),
+    )
+
+
+def _ends(between: str, bodies: tuple[str, ...]) -> tuple[str, str]:
+    """The two bodies of "body_a-body_b", where a name may contain a hyphen itself."""
+    for a in bodies:
+        b = between[len(a) + 1 :]
+        if between == f"{a}-{b}" and b in bodies:
+            return a, b
+    raise ValueError(f"element between {between!r}: expected two of the bodies {', '.join(bodies)} joined by '-'")
+
+
+@dataclass(frozen=True)
+class Cast:
+    """The test and the estimators that follow it."""
+
+    test: TestBlock
+    span: tuple[float, float]  # s, first and last sample of the recording
+    members: tuple[Member, ...] = ()
+
+    def with_member(self, new: Member) -> "Cast":
+        """The same with one more member, or with one replaced: an estimator that was started again."""
+        if new.name in self.names:
+            return replace(self, members=tuple(new if m.name == new.name else m for m in self.members))
+        return replace(self, members=self.members + (new,))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(m.name for m in self.members)
+
+    def member(self, name: str) -> Member:
+        return self.members[self.names.index(name)]
+
+    def color(self, name: str) -> Color:
+        return ESTIMATOR_COLORS[self.names.index(name) % len(ESTIMATOR_COLORS)]
+
+    def label(self, name: str) -> str:
+        """The estimator's name in legends; with its model where the models differ and the name does not say it."""
+        model, several = self.member(name).model, len({m.model for m in self.members}) > 1
+        return f"{name} ({model})" if several and model not in name else name
+
+    def shown(self, si_unit: str) -> Shown:
+        """The unit on the screen, and the factor from SI; forces among bodies of a few kilograms are in N."""
+        heaviest = max((mass or 0.0 for m in self.members for mass in m.masses), default=0.0)
+        return shown(si_unit, light=0.0 < heaviest < LIGHT)
+
+    @property
+    def equations(self) -> tuple[tuple[str, str], ...]:
+        """(name, unit) of every equation of any member: accelerations first, then forces."""
+        found = self._union(lambda m: m.equations)
+        return tuple(e for e in found if e[1] != "N") + tuple(e for e in found if e[1] == "N")
+
+    @property
+    def parameters(self) -> tuple[tuple[str, str], ...]:
+        return self._union(lambda m: m.parameters)
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        return self._union(lambda m: m.elements)
+
+    def _union(self, names_of: Callable[[Member], tuple]) -> tuple:
+        return tuple(dict.fromkeys(name for m in self.members for name in names_of(m)))

@@ -1,0 +1,145 @@
+"""One pass over the test: gathers the cast, then lets the show begin."""
+
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+import rerun as rr
+
+from .blocks import Block, EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock
+from .cast import Cast, Member, member
+from .show import Attempt, Show
+
+PATIENCE = 2.0
+"""s of wall clock that the first estimator waits for those that are expected before the show begins without them."""
+COURTESY = 0.5
+"""s that it waits for others where it is not known who will come."""
+
+FILE_PERIOD = 2.0
+"""s of wall clock between batches for the file."""
+
+UNKNOWN_TEST = TestBlock("test", "", "", 0, 0.0)
+
+
+class Pass:
+    """One run's blocks into a live recording and a file; they wait until the layout can be sent before them."""
+
+    def __init__(
+        self,
+        live: rr.RecordingStream,
+        file: tuple[rr.RecordingStream, Path] | None,
+        expected: tuple[str, ...],
+        first: bool,
+        attempt: Attempt,
+    ):
+        """first: of the session; attempt: as in Show."""
+        self.recordings = [live, file[0]] if file else [live]
+        self.path = file[1] if file else None
+        self.expected, self.first, self.attempt = expected, first, attempt
+        self.shows: list[Show] = []  # one for each recording
+        self.test: TestBlock | None = None
+        self.began: float | None = None
+        self.ended = False
+        self.samples: dict[str, int] = {}  # drawn, by estimator
+        self._waiting: list[Block | EventBlock] = []
+        self._unsaved: list[Block | EventBlock] = []
+        self._saved_at = 0.0  # monotonic s
+        self._heads: dict[str, dict[type, Block]] = {}  # each estimator's newest block of each kind
+
+    def set_test(self, test: TestBlock) -> None:
+        self.test = test
+        for recording in self.recordings:
+            recording.send_recording_name(test.id)
+
+    def write(self, items: Iterable[Block | EventBlock], at_once: bool = False) -> None:
+        """at_once: wait for no other estimator."""
+        self._waiting += items
+        self.began = self.began or time.monotonic()
+        for item in self._waiting:
+            if not isinstance(item, EventBlock):
+                self._heads.setdefault(item.estimator, {})[type(item)] = item
+        self._meet(at_once)
+        if self.shows:
+            names = self.shows[0].cast.names
+            ready = [item for item in self._waiting if item.estimator in names]
+            self._waiting = [item for item in self._waiting if item.estimator not in names]
+            self._draw(ready)
+
+    def _draw(self, ready: list[Block | EventBlock]) -> None:
+        self.shows[0].write(ready)
+        if self.path:
+            self._unsaved += ready
+            if time.monotonic() - self._saved_at > FILE_PERIOD:
+                self._save()
+        for item in ready:
+            if isinstance(item, ResidualBlock):
+                self.samples[item.estimator] = self.samples.get(item.estimator, 0) + len(item.time_ns)
+
+    def _save(self) -> None:
+        unsaved, self._unsaved = self._unsaved, []
+        self._saved_at = time.monotonic()
+        self.shows[1].write(unsaved)
+
+    def end(self) -> None:
+        """Nothing more comes: draw what waits, write the file's footer."""
+        if self.ended:
+            return
+        self.ended = True
+        self.write([], at_once=True)
+        if self._unsaved:
+            self._save()
+        for k in reversed(range(len(self.recordings))):  # the file first, whatever a viewer does
+            try:
+                if self.shows:
+                    self.shows[k].finish()
+                self.recordings[k].flush(timeout_sec=2.0)
+            finally:
+                self.recordings[k].disconnect()
+
+    @property
+    def complete(self) -> bool:
+        """Whether every estimator on stage has been drawn to the last sample."""
+        total = self.test.samples if self.test else 0
+        return total > 0 and bool(self.samples) and min(self.samples.values()) >= total
+
+    def report(self) -> str:
+        """One line: the file, and how much of the test is in it."""
+        total = f" of {self.test.samples}" if self.test else ""
+        names = self.shows[0].cast.names if self.shows else ()
+        drawn = [f"{name} {self.samples.get(name, 0)}{total} samples" for name in names]
+        return f"wrote {self.path}: {', '.join(drawn) or 'no samples'}"
+
+    def _meet(self, at_once: bool) -> None:
+        """Begin once all expected estimators are known, or patience ends; take in who comes or changes later."""
+        kinds = {ParameterBlock, ResidualBlock, ForceBlock}
+        ready = [name for name, heads in self._heads.items() if heads.keys() == kinds]
+        members = {name: self.attempt(lambda name=name: self._member(name)) for name in ready}
+        present = [name for name in ready if members[name]]
+        missing = self.test is None or any(name not in present for name in self.expected)
+        if not self.shows:
+            wait = PATIENCE if missing else 0.0 if self.expected else COURTESY
+            if not present or (time.monotonic() - self.began < wait and not at_once):
+                return
+            order = {name: k for k, name in enumerate(self.expected)}
+            present.sort(key=lambda name: (order.get(name, len(order)), name))
+            first = self._heads[present[0]][ResidualBlock]
+            cast = Cast(self.test or UNKNOWN_TEST, self._span(first))
+        else:
+            cast = self.shows[0].cast
+        for name in present:
+            cast = cast.with_member(members[name])
+        if not self.shows:
+            self.shows = [Show(recording, cast, self.first, self.attempt) for recording in self.recordings]
+        elif cast != self.shows[0].cast:
+            for show in self.shows:
+                show.set_cast(cast)
+
+    def _member(self, name: str) -> Member:
+        heads = self._heads[name]
+        return member(heads[ParameterBlock], heads[ResidualBlock], heads[ForceBlock])
+
+    def _span(self, block: ResidualBlock) -> tuple[float, float]:
+        """s, the recording's first and last instant, from any block's number."""
+        test = self.test or UNKNOWN_TEST
+        start = float(block.time_ns[0]) * 1e-9 - block.number * test.sample_period
+        return start, max(start + max(test.samples - 1, 0) * test.sample_period, float(block.time_ns[-1]) * 1e-9)

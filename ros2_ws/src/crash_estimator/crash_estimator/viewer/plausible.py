@@ -1,0 +1,55 @@
+"""How far an estimate that runs away is drawn, so that a few wild samples do not squash a plot.
+
+Limits follow from the data so far. Residuals and the table of errors are never limited: there it must show.
+"""
+
+import numpy as np
+
+from .blocks import ForceBlock, ParameterBlock, ResidualBlock
+
+PREDICTION = 2.5
+"""Times the largest measurement: a prediction beyond it runs along this limit."""
+PARAMETER = 5.0
+"""Times the median: a parameter beyond it leaves a gap (a secant stiffness at the end of the rebound is 0 / 0)."""
+FORCE = 2.0
+"""Times the sum of mass times largest acceleration of the bodies: what no element of the structure can carry."""
+KEPT = 2000
+
+
+class Limits:
+    """Remembers what the limits need, by estimator and name."""
+
+    def __init__(self) -> None:
+        self._largest: dict[tuple[str, str], float] = {}
+        self._thinned: dict[tuple[str, str], tuple[np.ndarray, int]] = {}  # values so far, every how manyth
+
+    def predicted(self, block: ResidualBlock, k: int) -> np.ndarray:
+        """(n,) predictions of equation k as they are drawn."""
+        limit = PREDICTION * self._largest_of(block.estimator, block.name[k], block.measured[:, k])
+        return np.clip(block.predicted[:, k], -limit, limit)
+
+    def parameter(self, block: ParameterBlock, k: int) -> np.ndarray:
+        """(n,) values of parameter k as they are drawn."""
+        key, value = (block.estimator, block.name[k]), block.value[:, k]
+        history, stride = self._thinned.get(key, (np.empty(0), 1))
+        size = np.abs(value[::stride])
+        history = np.append(history, size[size > 0])
+        if len(history) > KEPT:
+            history, stride = history[::2], 2 * stride
+        self._thinned[key] = history, stride
+        limit = PARAMETER * np.median(history) if len(history) else np.inf
+        return np.where(np.abs(value) <= limit, value, np.nan)
+
+    def force(self, block: ForceBlock) -> float:
+        """N, what an element may carry by the accelerations measured so far; infinite where none is measured."""
+        limit = 0.0
+        for k, (body, mass) in enumerate(zip(block.body, block.mass)):
+            if mass > 0:  # not NaN
+                limit += FORCE * mass * self._largest_of(block.estimator, f"{body}'s acceleration", block.acceleration[:, k])
+        return float(limit) or np.inf
+
+    def _largest_of(self, estimator: str, name: str, values: np.ndarray) -> float:
+        key = (estimator, name)
+        largest = float(np.fmax.reduce(np.abs(values), initial=self._largest.get(key, 0.0)))
+        self._largest[key] = largest
+        return largest

@@ -1,0 +1,171 @@
+"""The viewer's own thread: a bounded queue on one side, Rerun on the other. Nobody who hands data over ever waits."""
+
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Hashable
+from typing import NamedTuple
+
+from .blocks import Block, EventBlock, TestBlock
+from .passes import Pass
+from .sinks import Sinks
+
+Item = Block | EventBlock | TestBlock
+Make = Callable[[], Item]
+
+PERIOD = 0.05
+"""s between batches while little is going on."""
+SHARE = 0.2
+"""Of the time that writing may take: the longer a batch takes, the rarer, larger and so cheaper they become."""
+
+AT_THE_END = 30_000
+"""Items that are written within about two seconds when the end has come."""
+
+
+class Entry(NamedTuple):
+    """What waits in the queue."""
+
+    stream: Hashable  # None: not to be left out
+    index: int  # in its stream
+    make: Make
+
+
+class Recorder:
+    """Takes the blocks of each estimator in their order and writes them in batches."""
+
+    def __init__(
+        self, sinks: Sinks, expected: tuple[str, ...] = (), limit: int = 100_000, say: Callable[[str], None] = print
+    ):
+        """expected: estimators that the layout waits for a little; limit: items in the queue; say: told of trouble."""
+        self.sinks, self.expected, self.limit, self.say = sinks, expected, limit, say
+        self.dropped = 0
+        self.last_put = time.monotonic()
+        self._queue: deque[Entry] = deque()
+        self._counts: Counter[Hashable] = Counter()  # items of each stream so far
+        self._stride = 1  # every how manyth of them is kept
+        self._guard = threading.Lock()
+        self._stop = threading.Event()
+        self._busy = False
+        self._test: TestBlock | None = None
+        self._replay = 0  # a replay that is started again counts its runs from 0 again
+        self._passes: dict[tuple[int, int], Pass] = {}  # by (replay, run), the newest last
+        self._spare: Pass | None = self._open()  # its server is up before the first sample
+        self._troubles: set[str] = set()
+        self._thread = threading.Thread(target=self._work, name="rerun", daemon=True)
+        self._thread.start()
+
+    def put(self, make: Make, stream: Hashable = None) -> None:
+        """Hand over what makes an item; it is called in the recorder's thread, so decoding costs the caller nothing.
+
+        When the queue is full every second item of each stream goes, and of those that follow until it is empty:
+        coarser curves rather than a caller that waits. What belongs to no stream is kept.
+        """
+        self.last_put = time.monotonic()
+        with self._guard:
+            index = self._counts[stream]
+            self._counts[stream] += 1
+            entry = Entry(stream, index, make)
+            if len(self._queue) >= self.limit:
+                self._thin()
+            if self._is_kept(entry):
+                self._queue.append(entry)
+            else:
+                self.dropped += 1
+
+    def _thin(self) -> None:
+        self._stride *= 2
+        before = len(self._queue)
+        self._queue = deque(filter(self._is_kept, self._queue))
+        self.dropped += before - len(self._queue)
+
+    def _is_kept(self, entry: Entry) -> bool:
+        return entry.stream is None or entry.index % self._stride == 0
+
+    @property
+    def idle(self) -> bool:
+        """Whether all that was handed over has been written."""
+        with self._guard:
+            return not self._queue and not self._busy
+
+    @property
+    def complete(self) -> bool:
+        """Whether the newest pass has been drawn to its last sample."""
+        newest = list(self._passes.values())[-1:]
+        return bool(newest) and newest[0].complete
+
+    def close(self, timeout: float = 6.0) -> list[str]:
+        """Write what is left, end the files properly, and say in lines what was written; takes `timeout` s at most."""
+        with self._guard:
+            self.limit = min(self.limit, AT_THE_END)
+            while len(self._queue) > self.limit and self._stride < AT_THE_END:
+                self._thin()
+        self._stop.set()
+        self._thread.join(timeout)
+        if self._thread.is_alive():
+            return [f"the recording was not finished within {timeout:g} s: its last samples may be missing"]
+        lines = [pass_.report() for pass_ in self._passes.values() if pass_.path]
+        if self.dropped:
+            lines.append(f"{self.dropped} messages were left out of the picture: they came faster than it can be drawn")
+        return lines
+
+    def _work(self) -> None:
+        pause = PERIOD
+        while not self._stop.wait(pause):
+            began = time.monotonic()
+            self._write_batch()
+            pause = max(PERIOD, (time.monotonic() - began) * (1 - SHARE) / SHARE)
+        self._write_batch()
+        for pass_ in reversed([*filter(None, [self._spare]), *self._passes.values()]):  # the one with the server last
+            self._guarded(pass_.end)
+
+    def _write_batch(self) -> None:
+        with self._guard:
+            batch, self._queue, self._stride = self._queue, deque(), 1
+            self._busy = True
+        made = [self._guarded(entry.make) for entry in batch]
+        for item in made:
+            if isinstance(item, TestBlock):
+                self._meet_test(item)
+        by_run: dict[int, list[Block | EventBlock]] = {}
+        for item in made:
+            if item is not None and not isinstance(item, TestBlock):
+                by_run.setdefault(item.run, []).append(item)
+        for run in sorted(by_run):
+            self._guarded(lambda run=run: self._pass(run).write(by_run[run]))
+        if not by_run and self._passes:  # who waits for an estimator that does not come waits no longer
+            self._guarded(lambda: list(self._passes.values())[-1].write([]))
+        with self._guard:
+            self._busy = False
+
+    def _meet_test(self, test: TestBlock) -> None:
+        if self._test is not None and self._passes:
+            self._replay += 1
+        self._test = test
+
+    def _pass(self, run: int) -> Pass:
+        key = (self._replay, run)
+        if key not in self._passes:
+            for old in list(self._passes.values())[1:-1]:  # the first one keeps the server, the last may get more
+                old.end()
+            self._passes[key], self._spare = self._spare or self._open(), None
+        pass_ = self._passes[key]
+        if pass_.test is None and self._test:
+            pass_.set_test(self._test)
+        return pass_
+
+    def _open(self) -> Pass:
+        """One complete pass in a file is enough: a test that is replayed in a loop must not fill the disk."""
+        have_one = any(pass_.path and pass_.complete for pass_ in self._passes.values())
+        file = None if have_one else self.sinks.open_file()
+        return Pass(self.sinks.open_live(), file, self.expected, not self._passes, self._guarded)
+
+    def _guarded(self, action: Callable):
+        """A block that cannot be drawn is said once and left out; the rest goes on."""
+        try:
+            return action()
+        except Exception as error:  # whatever it is, the thread must live
+            trouble = f"{type(error).__name__}: {error}"
+            if trouble not in self._troubles:
+                self._troubles.add(trouble)
+                self.say(f"the viewer leaves something out: {trouble}")
+            return None

@@ -1,0 +1,109 @@
+"""A picture of a Rerun recording without a screen: python -m crash_estimator.viewer.screenshot run.rrd run.png"""
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from rerun.experimental import ViewerClient
+
+from .native import viewer_binary
+from .pen import TIMELINE
+from .sinks import usable_port
+
+LIBRARIES = (
+    "mesa-vulkan-drivers libvulkan1 libgl1-mesa-dri libegl1 libgl1 libxkbcommon-x11-0 libxcursor1 libxi6 libxrandr2 "
+    "fonts-dejavu-core"
+)
+"""Debian packages that drawing without a screen takes."""
+
+
+class ScreenshotError(RuntimeError):
+    """The viewer did not start or did not draw; the message is one readable line."""
+
+
+def screenshot(
+    rrd: str | Path, png: str | Path, at: float | None = None, size: tuple[int, int] = (1600, 900), patience: float = 60.0
+) -> None:
+    """Draw a recording as the viewer would show it, the time cursor at `at` s since the impact (None: at the end).
+
+    Raises ScreenshotError where no viewer can run; what it needs is in LIBRARIES.
+    """
+    rrd, png = Path(rrd).resolve(), Path(png).resolve()
+    if not rrd.is_file():
+        raise ScreenshotError(f"{rrd}: no such recording")
+    port = usable_port(0)
+    command = [viewer_binary(), "--headless", f"--window-size={size[0]}x{size[1]}", "--bind=127.0.0.1", f"--port={port}"]
+    quiet = {**os.environ, "RUST_LOG": "error", "RERUN_APP_ONLY": "true"}  # messages would pop up in the picture
+    process = subprocess.Popen(
+        [*command, "--hide-welcome-screen"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=quiet
+    )
+    try:
+        viewer = _connected(process, f"rerun+http://127.0.0.1:{port}/proxy", time.monotonic() + patience)
+        viewer.open(str(rrd))
+        _wait_until_loaded(viewer, time.monotonic() + patience)
+        if at is not None:
+            viewer.set_time(TIMELINE, duration=at, play_state="paused")
+        png.write_bytes(_settled_picture(viewer, time.monotonic() + patience))
+    finally:
+        process.terminate()
+        process.communicate()
+
+
+def _connected(process: subprocess.Popen, url: str, deadline: float) -> ViewerClient:
+    while time.monotonic() < deadline:
+        if process.poll() is not None:
+            said = (process.stderr.read().decode(errors="replace").strip().splitlines() or ["nothing"])[-1]
+            raise ScreenshotError(f"the Rerun viewer stopped, saying: {said} (it needs: apt install {LIBRARIES})")
+        try:
+            viewer = ViewerClient.connect(url)
+            viewer.get_state()
+            return viewer
+        except ConnectionError:
+            time.sleep(0.1)
+    raise ScreenshotError(f"the Rerun viewer did not answer at {url}")
+
+
+def _wait_until_loaded(viewer: ViewerClient, deadline: float) -> None:
+    while time.monotonic() < deadline:
+        state = viewer.get_state()
+        if not state.loading and any(recording.timelines for recording in state.recordings):
+            return
+        time.sleep(0.1)
+    raise ScreenshotError("the Rerun viewer did not finish loading the recording")
+
+
+def _settled_picture(viewer: ViewerClient, deadline: float) -> bytes:
+    """PNG: views fill over some frames after the data are there, and show dots that move as long as they do."""
+    before = b""
+    while time.monotonic() < deadline:
+        time.sleep(0.4)
+        picture = viewer.take_screenshot()
+        if picture == before:
+            return picture
+        before = picture
+    raise ScreenshotError("the Rerun viewer did not finish drawing")
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="screenshot", description="Draw a Rerun recording into a PNG file.")
+    parser.add_argument("rrd")
+    parser.add_argument("png")
+    parser.add_argument("--at", type=float, help="time cursor, s since the impact (default: the end)")
+    parser.add_argument("--size", default="1600x900", help="WIDTHxHEIGHT in pixels")
+    arguments = parser.parse_args(argv)
+    width, _, height = arguments.size.partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        parser.error(f"--size must be WIDTHxHEIGHT such as 1600x900, got {arguments.size!r}")
+    try:
+        screenshot(arguments.rrd, arguments.png, arguments.at, (int(width), int(height)))
+    except ScreenshotError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

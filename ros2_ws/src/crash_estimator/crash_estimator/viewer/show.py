@@ -1,0 +1,67 @@
+"""One pass over a recording on the screen: blocks in, Rerun data out."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import rerun as rr
+
+from .blocks import Block, EventBlock, ForceBlock, ParameterBlock, ResidualBlock, join
+from .cast import Cast
+from .curves import Curves
+from .layout import blueprint
+from .loops import Loops
+from .motion import Motion
+from .pen import Pen
+from .states import States
+from .summary import Summary
+
+Attempt = Callable[[Callable[[], Any]], Any]
+
+
+class Show:
+    """Writes what the estimators say in one run into one Rerun recording."""
+
+    def __init__(self, recording: rr.RecordingStream, cast: Cast, activate: bool, attempt: Attempt):
+        """activate: show this layout at once; otherwise whoever arranged the views anew keeps their arrangement.
+
+        attempt: calls what may fail for one estimator and must not harm the others.
+        """
+        self.recording, self.activate, self.attempt = recording, activate, attempt
+        self.pen = Pen(recording)
+        self.curves, self.loops, self.motion = Curves(self.pen), Loops(self.pen), Motion(self.pen)
+        self.states, self.summary = States(self.pen), Summary(self.pen)
+        self.set_cast(cast)
+
+    def set_cast(self, cast: Cast) -> None:
+        """The layout for this cast; views change when an estimator joins, data that are written stay."""
+        self.cast = cast
+        self.pen.restyle()
+        self.motion.set_cast(cast)
+        self.recording.send_blueprint(blueprint(cast), make_active=self.activate)
+
+    def write(self, items: Sequence[Block | EventBlock]) -> None:
+        """What members of the cast say, in the order it came; the more at a time, the cheaper."""
+        blocks = [item for item in items if not isinstance(item, EventBlock)]
+        for block in join(blocks):
+            self.attempt(lambda block=block: self._write_block(block))
+        self.states.write_events(self.cast, [item for item in items if isinstance(item, EventBlock)])
+        if blocks:
+            self.summary.write(self.cast)
+
+    def _write_block(self, block: Block) -> None:
+        match block:
+            case ParameterBlock():
+                self.curves.write_parameters(self.cast, block)
+                self.summary.add_parameters(block)
+            case ResidualBlock():
+                self.curves.write_residuals(self.cast, block)
+                self.summary.add_residuals(block)
+            case ForceBlock():
+                self.loops.write(self.cast, block)
+                self.motion.write(self.cast, block)
+                self.states.write(self.cast, block)
+
+    def finish(self) -> None:
+        """The last sample has been written."""
+        self.motion.finish(self.cast)
+        self.summary.write(self.cast)

@@ -1,0 +1,65 @@
+"""Where the recordings go: a gRPC server that viewers connect to whenever they like, and .rrd files.
+
+Two Rerun recordings for each pass over the test. The live one is written in small batches; the file in large ones, or
+it would be ten times as large and slow to open. The server belongs to the first live recording and lives until the
+end; later passes (a loop, a seek) are sent through the same server.
+"""
+
+import socket
+import uuid
+from pathlib import Path
+
+import rerun as rr
+
+APPLICATION = "crash_estimator"
+
+
+class Sinks:
+    """Makes the recordings of one session."""
+
+    def __init__(self, port: int = 9876, rrd: str | Path = "", memory_limit: str = "1GiB"):
+        """port: of the server on 127.0.0.1, 0 or one in use: a free one is taken; rrd: no file where it is empty."""
+        self.port = usable_port(port)
+        self.url = f"rerun+http://127.0.0.1:{self.port}/proxy"
+        self.rrd = Path(rrd).absolute() if str(rrd) else None
+        self.memory_limit = memory_limit
+        self.started, self.files = 0, 0
+        if self.rrd:
+            self.rrd.parent.mkdir(parents=True, exist_ok=True)
+
+    def open_live(self) -> rr.RecordingStream:
+        recording = _recording()
+        if self.started:
+            recording.set_sinks(rr.GrpcSink(self.url))
+        else:
+            recording.set_sinks(rr.GrpcServerSink("127.0.0.1", self.port, server_memory_limit=self.memory_limit))
+        self.started += 1
+        return recording
+
+    def open_file(self) -> tuple[rr.RecordingStream, Path] | None:
+        """None where no file is wanted. Raises OSError where it cannot be written."""
+        if self.rrd is None:
+            return None
+        path = self.rrd if not self.files else self.rrd.with_stem(f"{self.rrd.stem}-{self.files + 1}")
+        path.open("wb").close()  # Rerun would say so from another thread and go on without a file
+        recording = _recording()
+        recording.set_sinks(rr.FileSink(str(path)))
+        self.files += 1
+        return recording, path
+
+
+def _recording() -> rr.RecordingStream:
+    return rr.RecordingStream(APPLICATION, recording_id=str(uuid.uuid4()))
+
+
+def usable_port(wanted: int) -> int:
+    """The port itself if it is free on 127.0.0.1, otherwise any that is."""
+    for port in (wanted, 0):
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError:
+                continue
+            return probe.getsockname()[1]
+    raise OSError("no free port on 127.0.0.1")

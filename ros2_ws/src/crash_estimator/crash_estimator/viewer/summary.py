@@ -1,0 +1,97 @@
+"""A table of errors and parameters that is kept up to date."""
+
+import math
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from .blocks import ParameterBlock, ResidualBlock
+from .cast import Cast
+from .curves import BAND
+from .pen import Pen
+
+Key = tuple[str, str]  # (estimator, equation or parameter)
+
+
+class Summary:
+    """Adds up what the table says; `write` logs it."""
+
+    def __init__(self, pen: Pen):
+        self.pen = pen
+        self.errors: dict[Key, np.ndarray] = {}  # [samples, sum of squared residuals, samples inside the band]
+        self.parameters: dict[Key, tuple[float, float]] = {}
+        self.time_ns = 0
+
+    def add_residuals(self, block: ResidualBlock) -> None:
+        """From the impact on."""
+        after = block.time_ns >= 0
+        for k, body in enumerate(block.name):
+            residual, std = block.residual[after, k], block.residual_std[after, k]
+            valid = ~np.isnan(residual)
+            inside = np.abs(residual[valid]) <= BAND * std[valid]
+            sums = np.array([valid.sum(), np.sum(residual[valid] ** 2), inside.sum()], dtype=float)
+            self.errors[block.estimator, body] = self.errors.get((block.estimator, body), 0.0) + sums
+        self.time_ns = max(self.time_ns, int(block.time_ns[-1]))
+
+    def add_parameters(self, block: ParameterBlock) -> None:
+        for k, name in enumerate(block.name):
+            self.parameters[block.estimator, name] = (float(block.value[-1, k]), float(block.std[-1, k]))
+
+    def write(self, cast: Cast) -> None:
+        document = rr.TextDocument(self.text(cast), media_type="text/markdown")
+        self.pen.recording.set_time("crash_time", duration=np.timedelta64(self.time_ns, "ns"))
+        self.pen.recording.log("summary", document)
+
+    def text(self, cast: Cast) -> str:
+        """Markdown: rows are equations and parameters, columns estimators."""
+        names = cast.names
+        lines = [f"**{cast.test.id}** {cast.test.title}", "", _row("", list(names)), "|---|" + "---:|" * len(names)]
+        lines.append(_row("model", [m.model for m in cast.members]))
+        lines.append(_row("method", [m.method for m in cast.members]))
+        lines.append(_group("RMS residual", len(names)))
+        for body, unit in cast.equations:
+            lines.append(_row(f"{body}, {cast.shown(unit).unit}", [self._rms(name, body, cast.shown(unit).factor) for name in names]))
+        lines.append(_group("parameter ± σ", len(names)))
+        for parameter, unit in cast.parameters:
+            cells = [self._parameter(name, parameter, cast.shown(unit).factor) for name in names]
+            symbol = parameter.replace(".stiffness", " K").replace(".damping", " C")
+            lines.append(_row(f"{symbol}, {cast.shown(unit).unit}", cells))
+        lines.append(_group("inside the 99 % band", len(names)))
+        for body, _ in cast.equations:
+            lines.append(_row(body, [self._inside(name, body) for name in names]))
+        return "\n".join(lines)
+
+    def _rms(self, name: str, body: str, factor: float) -> str:
+        count, squares, _ = self.errors.get((name, body), (0.0, 0.0, 0.0))
+        return f"{factor * np.sqrt(squares / count):.3g}" if count else "–"
+
+    def _inside(self, name: str, body: str) -> str:
+        count, _, inside = self.errors.get((name, body), (0.0, 0.0, 0.0))
+        return f"{100 * inside / count:.1f} %" if count else "–"
+
+    def _parameter(self, name: str, parameter: str, factor: float) -> str:
+        if (name, parameter) not in self.parameters:
+            return "–"
+        value, std = (factor * x for x in self.parameters[name, parameter])
+        return with_std(value, std)
+
+
+def with_std(value: float, std: float) -> str:
+    """Both to the first digit of the standard deviation, such as 1540 ± 20."""
+    if not (std > 0 and math.isfinite(std)):
+        return f"{value:.4g}"
+    digits = -math.floor(math.log10(std))
+    return f"{round(value, digits):.{max(digits, 0)}f} ± {round(std, digits):.{max(digits, 0)}f}"
+
+
+def _row(title: str, cells: list[str]) -> str:
+    return f"| {title} | " + " | ".join(cells) + " |"
+
+
+def _group(title: str, columns: int) -> str:
+    return _row(f"**{title}**", [""] * columns)
+
+
+def summary_view() -> rrb.View:
+    return rrb.TextDocumentView(origin="summary", name="errors and parameters")

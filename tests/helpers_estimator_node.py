@@ -1,0 +1,124 @@
+"""Estimator nodes in this process, on a ROS domain of their own, fed by a publisher of the test's own."""
+
+import os
+import subprocess
+import sys
+import time
+from array import array
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from crash_msgs.msg import Event, Forces, Parameters, Residuals, Samples, TestInfo
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from crash_estimator.demo.domain import free_domain
+from crash_estimator.nodes.estimator_node import EstimatorNode
+from crash_replay.qos import LATCHED, STREAM
+from crash_replay.recording import Recording
+from crash_replay.ros_messages import samples_to_msg, test_to_msg
+
+TIME_ZERO = 1_000_000_000
+TOPICS = {"parameters": Parameters, "residuals": Residuals, "forces": Forces, "events": Event}
+
+
+class Stage:
+    """A replay's stand-in and listener, and the estimators it feeds."""
+
+    def __init__(self):
+        self.domain = free_domain()
+        rclpy.init(domain_id=self.domain)
+        self.executor = EventsExecutor()
+        self.node = Node("stage")
+        self.executor.add_node(self.node)
+        self.test = self.node.create_publisher(TestInfo, "test", LATCHED)
+        self.samples = self.node.create_publisher(Samples, "samples", STREAM)
+        self.estimators: list[EstimatorNode] = []
+        self.heard: dict[str, dict[str, list]] = {}
+        self.replays: list[subprocess.Popen] = []
+
+    def close(self) -> None:
+        for replay in self.replays:
+            replay.terminate()
+            replay.wait(10)
+        for node in (*self.estimators, self.node):
+            node.destroy_node()
+        rclpy.shutdown()
+
+    def add_estimator(self, name: str = "estimator", **parameters) -> EstimatorNode:
+        overrides = [Parameter(key, value=value) for key, value in parameters.items()]
+        node = EstimatorNode(parameter_overrides=overrides, cli_args=["--ros-args", "-r", f"__node:={name}"])
+        self.estimators.append(node)
+        self.executor.add_node(node)
+        self.heard[name] = {topic: [] for topic in TOPICS}
+        for topic, kind in TOPICS.items():
+            self.node.create_subscription(kind, f"{name}/{topic}", self.heard[name][topic].append, STREAM)
+        self.spin_until(
+            lambda: self.samples.get_subscription_count() == len(self.estimators), "the estimator subscribes"
+        )
+        out = (node.parameters_out, node.residuals_out, node.forces_out, node.events_out)
+        self.spin_until(lambda: all(p.get_subscription_count() for p in out), "somebody listens to the estimator")
+        return node
+
+    def spin_until(self, done: Callable[[], bool], what: str, patience: float = 10.0) -> None:
+        deadline = time.monotonic() + patience
+        while not done():
+            assert time.monotonic() < deadline, f"waited {patience:g} s in vain until {what}"
+            self.executor.spin_once(timeout_sec=0.02)
+
+    def send_test(self, recording: Recording) -> None:
+        self.test.publish(test_to_msg(recording))
+        self.spin(0.1)
+
+    def spin(self, seconds: float) -> None:
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            self.executor.spin_once(timeout_sec=0.02)
+
+    def send(self, recording: Recording, start: int = 0, stop: int | None = None, block: int = 1, run: int = 0) -> None:
+        """Samples start, ..., stop - 1, at the estimators' pace."""
+        stop = len(recording) if stop is None else stop
+        for first in range(start, stop, block):
+            self.samples.publish(samples_to_msg(recording, first, min(first + block, stop), run, TIME_ZERO))
+            self.executor.spin_once(timeout_sec=0.0)
+
+    def replay(self, bag: Path, wait_for: int, rate: float = 0.5) -> None:
+        """Start the real replay, one sample a message."""
+        command = [
+            sys.executable,
+            "-m",
+            "crash_replay.replay_node",
+            "--ros-args",
+            "-p",
+            f"bag:={bag}",
+            "-p",
+            f"rate:={rate}",
+        ]
+        command += ["-p", f"wait_for:={wait_for}", "-p", "block:=1"]
+        environment = os.environ | {"ROS_DOMAIN_ID": str(self.domain)}
+        self.replays.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, env=environment))
+
+    def wait_for(self, name: str, messages: int, patience: float = 10.0) -> dict[str, list]:
+        """What was heard of an estimator, once it has said so much about parameters, residuals and forces."""
+        heard = self.heard[name]
+        topics = ("parameters", "residuals", "forces")
+        self.spin_until(
+            lambda: all(len(heard[topic]) >= messages for topic in topics),
+            f"{messages} messages of {name} come",
+            patience,
+        )
+        self.spin(0.05)
+        return heard
+
+
+def joined(messages: list, field: str) -> np.ndarray:
+    """A field of all messages, (samples, width)."""
+    width = len(getattr(messages[0], field)) // len(messages[0].time_ns)
+    return np.concatenate([np.asarray(getattr(message, field)) for message in messages]).reshape(-1, width)
+
+
+def empty_samples(number: int, values: list[float]) -> Samples:
+    return Samples(number=number, time_ns=array("q", [0]), values=array("d", values))

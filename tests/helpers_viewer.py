@@ -1,0 +1,130 @@
+"""A believable stream of estimates for the viewer's tests: a cab and an engine against a barrier, K known.
+
+Cab 1300 kg, engine 400 kg, 16 m/s. Springs cab-barrier, engine-barrier and cab-engine carry compression and a little
+tension; integrated here with the explicit midpoint rule. An "estimator" is the truth with an error that dies away.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from crash_estimator.viewer.blocks import Block, EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock
+
+MASSES = np.array([1300.0, 400.0])
+STIFFNESS = np.array([4.0e5, 9.0e5, 6.0e5])  # cab_barrier, engine_barrier, cab_engine, N/m
+ELEMENTS = ("cab_barrier", "engine_barrier", "cab_engine")
+BETWEEN = ("cab-barrier", "engine-barrier", "cab-engine")
+NOISE = np.array([10.0, 10.0, 5e3])  # cab m/s^2, engine m/s^2, barrier N
+
+
+class Crash(NamedTuple):
+    time_ns: np.ndarray  # (n,)
+    crush: np.ndarray  # (n, 3)
+    force: np.ndarray  # (n, 3)
+    velocity: np.ndarray  # (n, 3) cab, engine, barrier
+    truth: np.ndarray  # (n, 3) cab and engine acceleration, barrier force
+    measured: np.ndarray  # (n, 3) with noise
+
+
+def test_block(crash: Crash) -> TestBlock:
+    return TestBlock("two-mass", "cab and engine against a barrier", "tests", len(crash.time_ns), 1e-4)
+
+
+test_block.__test__ = False
+
+
+def simulate(n: int = 1500, pre: int = 100, seed: int = 0) -> Crash:
+    """n samples at 10 kHz, of which `pre` lie before the impact."""
+    time_ns = np.arange(-pre, n - pre, dtype=np.int64) * 100_000
+    state = np.array([0.0, 0.0, 16.0, 16.0])  # positions, velocities
+    rows = []
+    for t in time_ns:
+        rows.append(_forces(state) if t >= 0 else (np.zeros(3), np.zeros(3), state * [0, 0, 1, 1]))
+        if t >= 0:
+            middle = state + 0.5e-4 * _derivative(state)
+            state = state + 1e-4 * _derivative(middle)
+    crush, force, states = (np.array(column) for column in zip(*rows))
+    truth = np.column_stack([_accelerations(force), force[:, 0] + force[:, 1]])
+    measured = truth + NOISE * np.random.default_rng(seed).standard_normal(truth.shape)
+    return Crash(time_ns, crush, force, np.column_stack([states[:, 2:], np.zeros(n)]), truth, measured)
+
+
+def _forces(state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    crush = np.array([state[0], state[1], state[0] - state[1]])
+    force = STIFFNESS * np.maximum(crush, 0.0)
+    return crush, force, state
+
+
+def _accelerations(force: np.ndarray) -> np.ndarray:
+    return np.stack([-force[..., 0] - force[..., 2], -force[..., 1] + force[..., 2]], axis=-1) / MASSES
+
+
+def _derivative(state: np.ndarray) -> np.ndarray:
+    return np.concatenate([state[2:], _accelerations(_forces(state)[1])])
+
+
+def estimates(
+    crash: Crash, estimator: str, error: float = 0.3, run: int = 0, size: int = 50, seed: int = 1
+) -> list[Block]:
+    """Blocks of `size` samples of an estimator whose parameters start `error` off and settle within 40 ms."""
+    random = np.random.default_rng(seed)
+    n = len(crash.time_ns)
+    seconds = np.maximum(crash.time_ns * 1e-9, 0.0)[:, None]
+    std = STIFFNESS * (0.005 + np.exp(-seconds / 0.01))
+    value = STIFFNESS * (1 + error * np.exp(-seconds / 0.01)) * (1 + 0.005 * random.standard_normal((n, 3)))
+    predicted = crash.truth * (1 - 0.5 * error * np.exp(-seconds / 0.02))
+    residual = crash.measured - predicted
+    sigma = np.tile(NOISE, (n, 1))
+    state = np.where(crash.crush <= 0, 2, np.where(np.gradient(crash.crush, axis=0) > 0, 0, 1)).astype(np.uint8)
+    acceleration = np.column_stack([crash.measured[:, :2], np.full(n, np.nan)])
+    blocks: list[Block] = []
+    for start in range(0, n, size):
+        rows = slice(start, start + size)
+        head = (estimator, run, start, crash.time_ns[rows], "frontal_engine_cab", estimator)
+        names = tuple(f"{element}.stiffness" for element in ELEMENTS)
+        blocks.append(
+            ParameterBlock(*head, names, ("N/m",) * 3, value[rows], std[rows], np.zeros((len(head[3]), 3), np.uint8))
+        )
+        blocks.append(
+            ResidualBlock(
+                *head,
+                ("cab", "engine", "barrier"),
+                ("m/s^2", "m/s^2", "N"),
+                crash.measured[rows],
+                predicted[rows],
+                1.2 * residual[rows],
+                1.2 * sigma[rows],
+                residual[rows],
+                sigma[rows],
+            )
+        )
+        blocks.append(
+            ForceBlock(
+                *head,
+                ELEMENTS,
+                BETWEEN,
+                ("cab", "engine", "barrier"),
+                np.array([*MASSES, np.nan]),
+                crash.crush[rows],
+                (value * np.maximum(crash.crush, 0.0))[rows],
+                state[rows],
+                crash.velocity[rows],
+                acceleration[rows],
+            )
+        )
+    return blocks
+
+
+def events(crash: Crash, estimator: str, run: int = 0) -> list[EventBlock]:
+    """The contact and the turn of each element."""
+    found = []
+    for k, element in enumerate(ELEMENTS):
+        contact, turn = int(np.argmax(crash.crush[:, k] > 0)), int(np.argmax(crash.crush[:, k]))
+        for number, kind in ((contact, "loading"), (turn, "unloading")):
+            time, crush_mm = crash.time_ns[number] * 1e-9, 1e3 * crash.crush[number, k]
+            found.append(
+                EventBlock(
+                    estimator, run, number, time, kind, element, f"{element}: {kind} at {crush_mm:.0f} mm of crush"
+                )
+            )
+    return found
