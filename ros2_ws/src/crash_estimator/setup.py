@@ -15,6 +15,7 @@ setup(
     ],
     entry_points={
         "console_scripts": [
+            "demo = crash_estimator.demo.command:main",
             "estimate = crash_estimator.cli.estimate:main",
             "estimator = crash_estimator.nodes.estimator_node:main",
             "viewer = crash_estimator.nodes.viewer_node:main",

@@ -14,16 +14,16 @@ from crash_replay.recording import RecordingError
 from ..core.structure import ModelError
 
 
-def guarded(command: Callable[[], None]) -> int:
-    """Run a command -> exit status: 0 done, 1 with one line on standard error where data or model are at fault."""
+def guarded(command: Callable[[], int | None]) -> int:
+    """Run a command -> exit status: 0 done, or what it says; 1 with one line on standard error where data or model
+    are at fault."""
     try:
-        command()
+        return command() or 0
     except (RecordingError, ModelError, OSError) as error:
         print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         return 130
-    return 0
 
 
 def parse_settings(pairs: list[str]) -> dict[str, float | int | bool]:

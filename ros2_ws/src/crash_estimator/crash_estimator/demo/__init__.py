@@ -1,0 +1,1 @@
+"""`demo`: a recording replayed, estimated and shown, everything in one command."""

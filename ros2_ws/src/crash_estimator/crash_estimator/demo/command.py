@@ -1,0 +1,122 @@
+"""`demo`: a recording replayed, estimated and shown, everything in one command.
+
+make demo                                    the simulated frontal impact that comes with the project
+make demo RECORDING=../data/nhtsa-10146      one of your own: a bag, CSV with YAML, an NHTSA or ISO-MME folder
+"""
+
+import argparse
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from crash_replay.conditioning import CFC_CLASSES
+from crash_replay.recording import Recording
+
+from ..cli.common import guarded
+from ..core.methods import METHODS
+from ..model_file import ready_models
+from .children import Children
+from .choice import BUNDLED_MODEL, Choice, as_bag, bundled_recording, choose, default_rate
+from .domain import own_environment
+from .terminal import Terminal
+
+PATIENCE_OF_REPLAY = 600.0
+"""s that the replay waits for its subscribers; the demonstration lets it go on earlier where one has died."""
+
+
+def main() -> int:
+    for number in (signal.SIGTERM, signal.SIGHUP):  # as Ctrl-C: what was started is ended
+        signal.signal(number, _interrupt)
+    signal.signal(signal.SIGINT, _interrupt)  # also where a shell without job control has it ignored
+    arguments = _parser().parse_args()
+    return guarded(lambda: demo(arguments))
+
+
+def _interrupt(*_) -> None:
+    raise KeyboardInterrupt
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="demo", description="Replay a recording, estimate on it and show it, everything in one command."
+    )
+    parser.add_argument(
+        "--recording", type=Path, metavar="PATH",
+        help="a bag, or what `import` reads: CSV with YAML, NHTSA EV5 or ISO-MME folder (default: a simulated one)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--model", action="append", default=[], metavar="M",
+        help=f"a .yaml file, or one of {', '.join(ready_models())}; may be repeated (default: the ready ones that fit)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--method", action="append", default=[], choices=METHODS, help="may be repeated: they run side by side"
+    )
+    parser.add_argument(
+        "--cfc", type=int, choices=(0, *CFC_CLASSES),
+        help="filter what is imported with this class of SAE J211-1, 0: not (default: 60 for a laboratory's folder)",
+    )  # fmt: skip
+    parser.add_argument("--rate", type=_rate, help="times real time (default: such that it takes about 15 s)")
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for what is written (default: out)")
+    parser.add_argument("--no-viewer", action="store_true", help="without Rerun: the terminal only")
+    return parser
+
+
+def _rate(text: str) -> float:
+    rate = float(text)
+    if not 0.001 <= rate <= 1000.0:
+        raise argparse.ArgumentTypeError(f"must be between 0.001 and 1000 times real time, got {text}")
+    return rate
+
+
+def demo(arguments: argparse.Namespace) -> int:
+    """Exit status 0, or 1 where the replay or every estimator died."""
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    source = arguments.recording or bundled_recording()
+    recording, bag, lines = as_bag(source, arguments.out, arguments.cfc)
+    by_default = () if arguments.recording else (BUNDLED_MODEL,)
+    choices = choose(recording.test, arguments.model, arguments.method, by_default)
+    rate = arguments.rate or default_rate(recording.time[-1] - recording.time[0])
+    terminal = Terminal()
+    for line in (*lines, *_announcement(recording, source, choices, rate)):
+        terminal.say(line)
+    os.environ.update(own_environment())
+    terminal.say(f"other nodes can listen in with ROS_DOMAIN_ID={os.environ['ROS_DOMAIN_ID']}")
+    rrd = None if arguments.no_viewer else arguments.out / "demo.rrd"
+    with Children(arguments.out / "log", os.environ) as children:
+        _start(children, bag, choices, rate, rrd)
+        from .run import Run  # takes rclpy, while the processes start, which take it too
+
+        return Run(children, choices, terminal, rrd).to_the_end()
+
+
+def _announcement(recording: Recording, source: Path, choices: Sequence[Choice], rate: float) -> list[str]:
+    test, time_ms = recording.test, recording.time * 1e3
+    frequency = f"{1e-3 / recording.sample_period:.4g} kHz" if recording.sample_period else "no rate"
+    wall = (recording.time[-1] - recording.time[0]) / rate
+    return [
+        f"{test.id}: {test.title or source}",
+        f"{len(recording)} samples at {frequency}, {time_ms[0]:.4g} to {time_ms[-1]:.4g} ms, "
+        f"replayed at {rate:g} x real time: {wall:.3g} s",
+        *(f"estimator {choice.name}: model {choice.model}, method {choice.method}" for choice in choices),
+    ]
+
+
+def _start(children: Children, bag: Path, choices: Sequence[Choice], rate: float, rrd: Path | None) -> None:
+    """All at once; the one that takes longest to start first."""
+    names = [choice.name for choice in choices]
+    if rrd is not None:
+        rrd.unlink(missing_ok=True)  # an older one must not pass for this one
+        viewer = dict(estimators=names, rrd=str(rrd.absolute()), exit_when_finished=True)
+        children.start("viewer", "crash_estimator", "viewer", **viewer)
+    for choice in choices:
+        parameters = dict(model=choice.model, method=choice.method)
+        children.start(choice.name, "crash_estimator", "estimator", node=choice.name, **parameters)
+    listeners = len(names) + (rrd is not None) + 1  # estimators, viewer and this process
+    waiting = dict(wait_for=listeners, wait_timeout=PATIENCE_OF_REPLAY)
+    children.start("replay", "crash_replay", "replay", bag=str(bag), rate=rate, **waiting)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,167 @@
+"""One demonstration from its first sample to its last line."""
+
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import rclpy
+from rclpy.executors import Executor
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from crash_replay.ros_runtime import acknowledge_promptly
+
+from ..core.errors import equation_errors
+from ..tables import error_table, parameter_table
+from ..viewer.native import has_display
+from .children import Child, Children
+from .choice import Choice
+from .terminal import Terminal
+from .watch import Watch
+
+PERIOD = 0.05
+"""s between two looks at the processes."""
+LATE = 10.0
+"""s that estimators which are ready wait for the viewer."""
+SILENCE = 3.0
+"""s without a message after which nothing more is expected of a replay that has ended."""
+WRITING = 20.0
+"""s that the viewer has to finish its file."""
+LOOK_AT = (
+    ("Overview", "measured and predicted acceleration; below, the residual leaves its 99 % band where a model fails"),
+    ("Force over crush", "the loop of each element: its slope is the stiffness, what it encloses the absorbed energy"),
+    ("Parameters", "stiffness with its sigma; in the lanes below, when each element loads, unloads or is apart"),
+    ("Motion and states", "bodies and springs move with the time cursor: drag it through the crash"),
+)
+
+
+class Run:
+    """Watches the processes and tells the terminal."""
+
+    def __init__(self, children: Children, choices: Sequence[Choice], terminal: Terminal, rrd: Path | None):
+        self.children, self.terminal, self.rrd = children.all, terminal, rrd
+        self.choices = {choice.name: choice for choice in choices}
+        self.dead: set[str] = set()  # those that ended though they should not have
+        self.ended_at = 0.0  # when the replay had ended and something came for the last time
+        self.heard = 0
+        self.ready_at = 0.0  # s after the start, when all estimators were there
+        self.resumed = False
+
+    def to_the_end(self) -> int:
+        """Exit status 0, or 1 where the replay or every estimator died."""
+        acknowledge_promptly()
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        watch, executor = Watch(list(self.choices)), EventsExecutor()
+        executor.add_node(watch)
+        try:
+            self._follow(watch, executor)
+            self._tables(watch)
+            self._wait_for_viewer()
+        finally:
+            self.terminal.clear()
+            watch.destroy_node()
+            rclpy.shutdown()
+        return 1 if "replay" in self.dead or not self._alive() else 0
+
+    def _alive(self) -> list[str]:
+        return [name for name in self.choices if name not in self.dead]
+
+    def _follow(self, watch: Watch, executor: Executor) -> None:
+        began, encoding = time.monotonic(), self.terminal.stream.encoding
+        while not self._is_over(watch):
+            until = time.monotonic() + PERIOD
+            while (left := until - time.monotonic()) > 0:
+                executor.spin_once(timeout_sec=left)
+            self._tell_of_processes()
+            if watch.waiting:
+                waited = time.monotonic() - began
+                self.terminal.wait(self._start(watch, waited), waited)
+            else:
+                self.terminal.progress(watch.progress(encoding))
+        self.terminal.end_progress(watch.progress(encoding, watch.total))
+
+    def _is_over(self, watch: Watch) -> bool:
+        if not self._alive():
+            return True
+        if self.children["replay"].status is None:
+            return False
+        newest = [watch.samples.next, *(watch.followed[name].samples for name in self._alive())]
+        if watch.total and min(newest) >= watch.total:
+            return True
+        now = time.monotonic()
+        if watch.heard != self.heard or not self.ended_at:
+            self.heard, self.ended_at = watch.heard, now
+        return now - self.ended_at > SILENCE
+
+    def _tell_of_processes(self) -> None:
+        """Warnings of all, what the viewer says of itself, and who has died."""
+        for name, child in self.children.items():
+            for level, text in child.messages():
+                if level in ("WARN", "ERROR", "FATAL") or name == "viewer":
+                    self.terminal.say(f"{name}: {text}")
+            early = child.status != 0 or (name != "replay" and self.children["replay"].status is None)
+            if child.status is not None and early and name not in self.dead:
+                self.dead.add(name)
+                self.terminal.say(f"{name} has ended too early: {child.last_words()}")
+
+    def _start(self, watch: Watch, waited: float) -> str:
+        """Join in as the last, see to it that the replay begins; a line on what it waits for."""
+        alive = self._alive()
+        absent = watch.absent(alive)
+        if absent:
+            hint = ": after an update they compile their code first, half a minute" if waited > 5.0 else ""
+            return f"waiting for {', '.join(absent)}{hint}"
+        self.ready_at = self.ready_at or waited
+        late = waited - self.ready_at > (LATE if not self.dead else 2.0)
+        viewer = "viewer" in self.children and "viewer" not in self.dead
+        if viewer and watch.counted <= len(alive) and not watch.subscribed and not late:
+            return "waiting for the viewer"
+        watch.be_counted()
+        if (self.dead or late) and watch.counted > len(alive) and not self.resumed:
+            self.terminal.say(f"beginning without {', '.join(sorted(self.dead)) or 'the viewer'}")
+            watch.resume()
+            self.resumed = True
+        return "waiting for the first sample"
+
+    def _tables(self, watch: Watch) -> None:
+        replay = self.children["replay"]
+        if replay.status == 0:
+            self.terminal.say(f"replay {replay.last_line()}")
+        for name, choice in self.choices.items():
+            followed = watch.followed[name]
+            lost = followed.lost(watch.total)
+            self.terminal.say(
+                f"\n{name}: model {choice.model}, method {choice.method}, {followed.samples} samples, {lost} lost\n"
+            )
+            found = followed.found()
+            if found is None:
+                self.terminal.say("nothing was estimated")
+                continue
+            self.terminal.say(f"{parameter_table(*found)}\n\n{error_table(equation_errors(*found))}")
+
+    def _wait_for_viewer(self) -> None:
+        viewer: Child | None = self.children.get("viewer")
+        if viewer is None:
+            return
+        self.terminal.say()
+        deadline = time.monotonic() + WRITING
+        while viewer.status is None and time.monotonic() < deadline:
+            time.sleep(PERIOD)
+        self._tell_of_processes()
+        if viewer.status is None:
+            self.terminal.say(f"viewer: has not finished {self.rrd} within {WRITING:g} s, it is ended now")
+            return
+        if viewer.status == 0:
+            self.terminal.say(f"viewer {viewer.last_line()}")
+            rerun = Path(sys.prefix) / "bin" / "rerun"
+            again = f"{_short(rerun)} {self.rrd}"
+            window = "The viewer stays open; look at it again later" if has_display() else "Look at it"
+            self.terminal.say(f"\n{window} with: {again}\n\nWhat to look at, by tab:")
+            for tab, what in LOOK_AT:
+                self.terminal.say(f"  {tab:18} {what}")
+
+
+def _short(path: Path) -> Path:
+    """From the working folder where the path is below it."""
+    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path

@@ -1,0 +1,71 @@
+"""The demonstration on the terminal: one line that is kept up to date, and lines that stay."""
+
+import shutil
+import sys
+import time
+from typing import TextIO
+
+REDRAWN_EVERY = 0.1
+"""s, on a terminal."""
+SAID_EVERY = 2.0
+"""s, where the output goes into a file or a pipe."""
+BAR = 24
+ERASE = "\r\x1b[K"
+
+
+class Terminal:
+    """Prints lines; the last one may be replaced where the output is a terminal."""
+
+    def __init__(self, stream: TextIO | None = None):
+        self.stream = stream or sys.stdout
+        self.live = self.stream.isatty()
+        self.progress_line = self.waiting = ""
+        self.due = 0.0
+
+    def say(self, text: str = "") -> None:
+        """Lines that stay, above the progress line."""
+        self._write(f"{ERASE}{text}\n{self.progress_line}" if self.progress_line else f"{text}\n")
+
+    def progress(self, line: str) -> None:
+        """Replace the progress line; where that cannot be done it is printed every 2 s instead."""
+        now = time.monotonic()
+        if now >= self.due:
+            self.due = now + (REDRAWN_EVERY if self.live else SAID_EVERY)
+            self._show(line)
+
+    def wait(self, what: str, seconds: float) -> None:
+        """What is waited for, and how long already; where lines stay, each only once."""
+        if self.live:
+            self.progress(f"{what} ({seconds:.0f} s)")
+        elif what != self.waiting:
+            self._show(what)
+        self.waiting = what
+
+    def _show(self, line: str) -> None:
+        if self.live:
+            self.progress_line = line[: shutil.get_terminal_size().columns - 1]
+            self._write(ERASE + self.progress_line)
+        else:
+            self._write(f"{line}\n")
+
+    def end_progress(self, line: str) -> None:
+        """The progress line as it shall stay."""
+        self.progress_line = ""
+        self._write(f"{ERASE if self.live else ''}{line}\n")
+
+    def clear(self) -> None:
+        """Take the progress line away."""
+        if self.progress_line:
+            self.progress_line = ""
+            self._write(ERASE)
+
+    def _write(self, text: str) -> None:
+        self.stream.write(text)
+        self.stream.flush()
+
+
+def bar(share: float, encoding: str | None) -> str:
+    """A bar filled to `share`, in characters that the output's encoding has."""
+    full, empty = ("█", "░") if "utf" in (encoding or "").lower() else ("#", ".")
+    filled = round(min(max(share, 0.0), 1.0) * BAR)
+    return full * filled + empty * (BAR - filled)
