@@ -1,4 +1,4 @@
-.PHONY: help demo test bags clean
+.PHONY: help demo test bags thesis clean
 
 help: # what there is to make
 	@sed -n 's/^\([a-z]*\):.*# /make \1	/p' Makefile
@@ -14,6 +14,9 @@ test: # all tests; some of them with PYTEST_ARGS="-k name"
 
 bags: # the simulated recordings in bags/, made anew
 	@tools/run crash_replay synthesize --all --to bags
+
+thesis: # the thesis's simulated experiments run again: docs/thesis.md
+	@tools/env python -m crash_estimator.thesis
 
 clean: # removes what the set-up installed and built, and what the programs wrote
 	rm -rf .venv .setup out ros2_ws/build ros2_ws/install ros2_ws/log

@@ -1,4 +1,4 @@
-"""Effective masses: exact without noise, conserved without a barrier, right on NHTSA 10146, a first stage for others."""
+"""Effective masses: exact without noise, conserved without a barrier, right on NHTSA 10146, a first stage."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +24,9 @@ def frontal(masses=(1400.0, 350.0), noise=0.0, seed=0, n=800, pre=100):
     a = np.column_stack([-250.0 * np.sin(40.0 * t), -400.0 * np.sin(75.0 * t) - 90.0 * np.sin(200.0 * t)])
     random = np.random.default_rng(seed)
     force = -a @ masses + noise * 1500.0 * random.standard_normal(len(t)) * (time_ns >= 0)
-    channels = tuple(Channel(name, "acceleration") for name in ("car_ax", "engine_ax")) + (Channel("barrier_fx", "force"),)
+    channels = tuple(Channel(name, "acceleration") for name in ("car_ax", "engine_ax")) + (
+        Channel("barrier_fx", "force"),
+    )
     return Recording(Test("balance", channels), time_ns, np.column_stack([a, force]))
 
 

@@ -1,4 +1,4 @@
-"""Higher powers of crush and rate (equation 4.1), an unloading slope that is estimated, damping after stiffness (7.3)."""
+"""Higher powers of crush and rate (equation 4.1), an estimated unloading slope, damping after stiffness (7.3)."""
 
 from dataclasses import replace
 
@@ -33,7 +33,11 @@ def recording_of(force, noise=0.0, seed=0, n=400, pre=50):
     return Recording(recording.test, recording.time_ns, np.column_stack([a, travel, speed]))
 
 
-POWERS = (Term("crush", 2, constant(0.0, 1e6)), Term("crush", 3, constant(0.0, 1e8)), Term("rate", 2, constant(0.0, 100.0)))
+POWERS = (
+    Term("crush", 2, constant(0.0, 1e6)),
+    Term("crush", 3, constant(0.0, 1e8)),
+    Term("rate", 2, constant(0.0, 100.0)),
+)
 
 
 @pytest.mark.parametrize(("method", "settings"), [("rls", {}), ("kalman", {"noise_memory": 0})])

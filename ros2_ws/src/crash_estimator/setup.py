@@ -6,7 +6,7 @@ setup(
     name="crash_estimator",
     version="0.1.0",
     packages=find_packages(),
-    package_data={"crash_estimator": ["models/*.yaml"]},
+    package_data={"crash_estimator": ["models/*.yaml", "thesis/*.yaml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/crash_estimator"]),
         ("share/crash_estimator", ["package.xml"]),
@@ -18,6 +18,8 @@ setup(
             "demo = crash_estimator.demo.command:main",
             "estimate = crash_estimator.cli.estimate:main",
             "estimator = crash_estimator.nodes.estimator_node:main",
+            "report = crash_estimator.cli.report:main",
+            "simulate = crash_estimator.cli.simulate:main",
             "viewer = crash_estimator.nodes.viewer_node:main",
         ]
     },

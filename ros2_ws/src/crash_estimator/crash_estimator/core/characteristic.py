@@ -1,4 +1,4 @@
-"""Force over crush of each element, as estimated: loading curve, unloading line, damping (thesis figures 6.5, 6.9, 6.12).
+"""Force over crush of each element, as estimated: loading, unloading, damping (thesis figures 6.5, 6.9, 6.12).
 
 An estimator gives the force at every sample. What an element does is read off it:
 

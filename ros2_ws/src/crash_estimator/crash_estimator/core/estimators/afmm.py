@@ -108,7 +108,9 @@ class Afmm:
         if late > self.threshold and best.jumped > known:
             reported, events = best.jumped, (self._event(best, late, state, now.time),)
         update = self._combined(models)
-        return state._replace(models=self._branched(models, now.time), noise=noise, reported=reported, update=update), events
+        return state._replace(
+            models=self._branched(models, now.time), noise=noise, reported=reported, update=update
+        ), events
 
     def _weighed(self, model: Model, mean: Regression, noise: np.ndarray) -> Model:
         """The model after one step of its filter, its weight times the likelihood of what it did not expect."""
@@ -150,7 +152,9 @@ class Afmm:
     def _event(self, best: Model, probability: float, state: AfmmState, time: float) -> Event:
         change = np.where(self.settings.std > 0.0, best.filter.theta - state.update.theta, 0.0) / self.settings.scale
         name = self.settings.names[int(np.argmax(np.abs(change)))]
-        text = f"{name}: jumped at {best.jumped * 1e3:.1f} ms, probability {probability:.3f}, seen at {time * 1e3:.1f} ms"
+        text = (
+            f"{name}: jumped at {best.jumped * 1e3:.1f} ms, probability {probability:.3f}, seen at {time * 1e3:.1f} ms"
+        )
         return Event("jump", name, float(probability), text)
 
     def _learn_noise(self, noise: np.ndarray, mean: Regression, products: np.ndarray) -> np.ndarray:

@@ -82,7 +82,9 @@ class EffectiveMass:
             method="effective_mass",
             parameters=tuple(f"{name}.mass" for name in self.names),
             parameter_units=("kg",) * n,
-            equations=("momentum" if self.barrier is None else structure.bodies[structure.equations[self.barrier]].name,),
+            equations=(
+                "momentum" if self.barrier is None else structure.bodies[structure.equations[self.barrier]].name,
+            ),
             equation_units=("N",),
             elements=(),
             between=(),
@@ -95,7 +97,9 @@ class EffectiveMass:
         silent = [self.structure.bodies[k].name for k in self.free if not self.structure.bodies[k].acceleration]
         driven = [body.name for body in self.structure.bodies if body.driven]
         if silent or driven:
-            what = f"{silent[0]} has no acceleration channel" if silent else f"{driven[0]} is driven by an unknown force"
+            what = (
+                f"{silent[0]} has no acceleration channel" if silent else f"{driven[0]} is driven by an unknown force"
+            )
             raise ModelError(f"model {name}: effective mass needs every force and acceleration, but body {what}")
         if self.barrier is None and (len(self.free) < 2 or any(body.fixed for body in self.structure.bodies)):
             raise ModelError(
@@ -140,7 +144,7 @@ class EffectiveMass:
         return Balance(0.5 * (covariance + covariance.T), variance)
 
     def _regression(self, motion: Motion) -> Regression:
-        """The force on the barrier, or 0, as measured; -a as the masses' gradient. NaN where a channel has dropped out."""
+        """The force on the barrier, or 0, as measured; -a as the masses' gradient. NaN in a dropout."""
         a = motion.acceleration[self.free]
         force = motion.measured[self.barrier] if self.barrier is not None else 0.0
         gradient = (-a @ self.back)[None, :]
@@ -186,6 +190,8 @@ def with_effective_masses(structure: Structure, masses: dict[str, float]) -> Str
     found = {name.removesuffix(".mass"): mass for name, mass in masses.items()}
     for name, mass in found.items():
         if not mass > 0.0:
-            raise ModelError(f"model {structure.name}: the effective mass of {name} came out as {mass:.4g} kg, not above 0")
+            raise ModelError(
+                f"model {structure.name}: the effective mass of {name} came out as {mass:.4g} kg, not above 0"
+            )
     bodies = tuple(replace(body, mass=found.get(body.name, body.mass)) for body in structure.bodies)
     return replace(structure, bodies=bodies)

@@ -27,8 +27,8 @@ from .update import Theta, Update
 LARGEST_ROOT = 0.98
 """Of D and A, in modulus: at 1 the noise model would integrate, beyond it the predictor diverges."""
 
-COEFFICIENT_STD = 0.5
-"""Of the coefficients d and a before the first sample; they start from 0, white noise."""
+COEFFICIENT_STD = 1.0
+"""Of the coefficients d and a before the first sample; they start from 0, white noise. A slow error has d_1 near -1."""
 
 LONGEST = 100
 """Orders above this are a mistake in the settings."""
@@ -73,7 +73,9 @@ class GaussNewton:
             orders = getattr(self, name)
             for order in orders if isinstance(orders, tuple) else (orders,):
                 if isinstance(order, bool) or not isinstance(order, int) or not 0 <= order <= LONGEST:
-                    raise ModelError(f"order {name} of gauss_newton must be a whole number from 0 to {LONGEST}, got {order!r}")
+                    raise ModelError(
+                        f"order {name} of gauss_newton must be a whole number from 0 to {LONGEST}, got {order!r}"
+                    )
 
     def orders(self, equations: int) -> list[tuple[int, int]]:
         """(p, q) of each equation."""

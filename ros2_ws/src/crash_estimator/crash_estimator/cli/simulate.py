@@ -1,0 +1,147 @@
+"""`simulate BAG --model M`: estimate, then let the model run free from the impact and compare it with the measurement.
+
+With --from OTHER the forces come from another recording: a car with the interior of one test and the structure's
+motion of another, as in section 6.6 of the thesis.
+"""
+
+import argparse
+import sys
+
+import numpy as np
+
+from crash_replay.bag import read_bag
+from crash_replay.conditioning import CFC_CLASSES, cfc_filter
+from crash_replay.recording import Recording
+
+from ..core.characteristic import Characteristic, characteristics
+from ..core.fold import run
+from ..core.free_run import Comparison, FreeRun, compare, free_run
+from ..core.methods import METHODS, make_estimator
+from ..core.structure import ModelError, Structure
+from ..model_file import load_model, ready_models
+from ..tables import table
+from ..validation_tables import comparison_table
+from .common import guarded, parse_settings, write_json
+
+FILTER = 60
+"""CFC of signals that are rated, unless told otherwise: that of a vehicle structure's acceleration (SAE J211-1)."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="simulate", description=__doc__.partition("\n\n")[0])
+    parser.add_argument("bag", metavar="BAG", help="a recording: rosbag2 folder or .mcap file")
+    parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
+    parser.add_argument("--method", default="constrained_kalman", choices=[m for m in METHODS if m != "effective_mass"])
+    parser.add_argument("--set", nargs="*", default=[], metavar="NAME=VALUE", help="settings of the method")
+    parser.add_argument("--from", dest="source", metavar="OTHER", help="take the forces over crush from this recording")
+    parser.add_argument(
+        "--end", type=float, default=np.inf, metavar="S", help="simulate up to this time after the impact"
+    )
+    parser.add_argument(
+        "--cfc", type=int, choices=(0, *CFC_CLASSES), default=None, help="filter of the compared signals; 0: none"
+    )
+    parser.add_argument("--json", metavar="FILE", help="write everything that was found")
+    arguments = parser.parse_args()
+    sys.exit(guarded(lambda: simulate(arguments)))
+
+
+def simulate(arguments: argparse.Namespace) -> None:
+    structure = load_model(arguments.model)
+    settings = parse_settings(arguments.set)
+    recording = read_bag(arguments.bag)
+    if not arguments.end > 0.0:
+        raise ModelError(f"--end must be a time after the impact, above 0 s, got {arguments.end:g}")
+    estimator = make_estimator(structure, recording.test, arguments.method, **settings)
+    estimates = run(estimator, recording.samples())
+    description = estimator.description
+    laws = characteristics(structure, description, estimates)
+    if arguments.source:
+        other = read_bag(arguments.source)
+        donor = make_estimator(structure, other.test, arguments.method, **settings)
+        laws = characteristics(structure, donor.description, run(donor, other.samples()))
+    simulated = free_run(structure, description, estimates, laws, arguments.end)
+    smooth, said = smoother(recording, arguments.cfc)
+    comparisons = compare(structure, description, simulated, smooth)
+    origin = f"forces over crush of {other.test.id}" if arguments.source else "its own forces over crush"
+    print(f"{recording.test.id}: free run of {description.model} with {origin}, {description.method}; compared {said}")
+    print()
+    print(characteristic_table(laws))
+    print()
+    print(comparison_table(comparisons))
+    if arguments.json:
+        write_json(arguments.json, as_json(recording, structure, simulated, laws, comparisons, said))
+
+
+def smoother(recording: Recording, cfc: int | None):
+    """A filter for the signals that are compared, and what to say of it; None: CFC 60 where the sample rate allows."""
+    period = recording.sample_period
+    if cfc is None and period * FILTER * 10 <= 1.0:
+        cfc = FILTER
+    return (
+        (lambda values: cfc_filter(values, period, cfc), f"at CFC {cfc}")
+        if cfc
+        else (lambda values: values, "unfiltered")
+    )
+
+
+def characteristic_table(laws: tuple[Characteristic, ...]) -> str:
+    rows = []
+    for law in laws:
+        k = int(np.argmax(np.abs(law.force)))
+        slope = "elastic" if law.unloading is None else f"{law.unloading * 1e-3:.0f}"
+        rows.append(
+            (
+                law.element,
+                f"{law.crush.max() * 1e3:.0f}",
+                f"{law.force[k] * 1e-3:.2f}",
+                f"{law.crush[k] * 1e3:.0f}",
+                slope,
+                f"{law.damping:.0f}",
+            )
+        )
+    head = ("force over crush of", "crush mm", "largest kN", "at mm", "unloading kN/m", "damping N s/m")
+    return table(head, rows)
+
+
+def as_json(
+    recording: Recording,
+    structure: Structure,
+    simulated: FreeRun,
+    laws: tuple[Characteristic, ...],
+    comparisons: list[Comparison],
+    filtered: str,
+) -> dict:
+    """Everything in SI units; series over `time` in s."""
+    bodies = [body.name for body in structure.bodies]
+    elements = [element.name for element in structure.elements]
+    equations = [bodies[k] for k in structure.equations]
+
+    def series(values: np.ndarray, names: list[str]) -> dict:
+        return {name: values[:, k] for k, name in enumerate(names)}
+
+    return {
+        "test": recording.test.id,
+        "model": structure.name,
+        "compared": filtered,
+        "equation_units": dict(zip(equations, structure.equation_units)),
+        "characteristics": {law.element: law._asdict() for law in laws},
+        "comparisons": {
+            c.name: c._asdict()
+            | {"rating": None if c.rating is None else c.rating._asdict() | {"grade": c.rating.grade}}
+            for c in comparisons
+        },
+        "series": {
+            "time": simulated.time,
+            "measured": series(simulated.measured, equations),
+            "simulated": series(simulated.predicted, equations),
+            "displacement": series(simulated.displacement, bodies),
+            "velocity": series(simulated.velocity, bodies),
+            "measured_velocity": series(simulated.measured_velocity, bodies),
+            "crush": series(simulated.crush, elements),
+            "force": series(simulated.force, elements),
+        },
+    }
+
+
+if __name__ == "__main__":
+    main()

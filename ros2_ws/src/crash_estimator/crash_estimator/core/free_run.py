@@ -1,0 +1,177 @@
+"""Free run: the model simulated from its initial velocities with the estimated characteristics (thesis 4.5, 6.4.4).
+
+    M_k a_k = sum over elements of delta_k F(X, V),    4th-order Runge-Kutta, nothing corrected on the way
+
+Driven bodies move as their channels say; elements whose crush is a channel follow it. What an estimator followed
+sample by sample need not hold here: errors of the force add up in velocity and displacement.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .characteristic import Characteristic, characteristics
+from .estimate import Description, Estimate
+from .rating import Rating, rate
+from .structure import ModelError, Structure
+
+LONGEST_STEP = 2e-4
+"""s; a coarser recording is simulated in several steps a sample."""
+
+
+class FreeRun(NamedTuple):
+    """n samples after the impact, b bodies, e elements, q equations."""
+
+    time: np.ndarray  # (n,) s
+    displacement: np.ndarray  # (n, b) m
+    velocity: np.ndarray  # (n, b) m/s
+    acceleration: np.ndarray  # (n, b) m/s^2
+    crush: np.ndarray  # (n, e) m
+    force: np.ndarray  # (n, e) N
+    predicted: np.ndarray  # (n, q) in the equations' units
+    measured: np.ndarray  # (n, q)
+    measured_velocity: np.ndarray  # (n, b) m/s, integrated measurement
+
+
+class Comparison(NamedTuple):
+    """One signal, simulated against measured."""
+
+    name: str
+    unit: str
+    measured_peak: float  # the value largest in magnitude
+    simulated_peak: float
+    rms: float  # of the difference
+    rating: Rating | None  # None: too short, with gaps, or constant
+
+
+def free_run(
+    structure: Structure,
+    description: Description,
+    estimates: Sequence[Estimate],
+    given: tuple[Characteristic, ...] | None = None,
+    end: float = np.inf,
+) -> FreeRun:
+    """Simulate over the samples from time zero to `end` s.
+
+    The start and the driven motion are those of `estimates`; the characteristics are theirs too unless `given`,
+    from another test for instance. Raises ModelError where nothing is left to simulate.
+    """
+    after = [e for e in estimates if 0 <= e.time_ns * 1e-9 <= end]
+    if len(after) < 2:
+        raise ModelError(f"a free run needs at least two samples from time zero to {end:g} s, found {len(after)}")
+    laws = given or characteristics(structure, description, estimates)
+    time = np.array([e.time_ns for e in after]) * 1e-9
+    run = _System(structure, laws, time, after)
+    x, v = after[0].displacement.copy(), after[0].velocity.copy()
+    peak = run.largest(np.zeros(len(laws)), time[0], x)
+    states = [(x, v, peak)]
+    for start, stop in zip(time[:-1], time[1:]):
+        steps = int(np.ceil((stop - start) / LONGEST_STEP - 1e-9))
+        h = (stop - start) / steps
+        for k in range(steps):
+            x, v, peak = run.step(start + k * h, h, x, v, peak)
+        states.append((x, v, peak))
+    acceleration = np.array([run.accelerations(t, *state) for t, state in zip(time, states)])
+    force = np.array([run.forces(t, *state) for t, state in zip(time, states)])
+    return FreeRun(
+        time=time,
+        displacement=np.array([state[0] for state in states]),
+        velocity=np.array([state[1] for state in states]),
+        acceleration=acceleration,
+        crush=np.array([run.motion(t, x, v)[0] for t, (x, v, _) in zip(time, states)]),
+        force=force,
+        predicted=force @ structure.force_to_equation.T,
+        measured=np.array([e.measured for e in after]),
+        measured_velocity=np.array([e.velocity for e in after]),
+    )
+
+
+class _System:
+    """The right-hand side, with what is measured interpolated between samples."""
+
+    def __init__(
+        self, structure: Structure, laws: tuple[Characteristic, ...], time: np.ndarray, after: Sequence[Estimate]
+    ):
+        self.laws, self.ends, self.time = laws, structure.ends, time
+        self.masses = np.array([b.mass if b.free else np.inf for b in structure.bodies])
+        self.driven = [k for k, body in enumerate(structure.bodies) if body.driven]
+        self.given = [k for k, element in enumerate(structure.elements) if element.displacement]
+        measured = np.array([e.acceleration for e in after])
+        self.driving = {k: _bridged(measured[:, k]) for k in self.driven}
+        self.crushes = {k: np.array([e.crush[k] for e in after]) for k in self.given}
+        self.rates = {k: np.array([e.rate[k] for e in after]) for k in self.given}
+
+    def motion(self, t: float, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(e,) crush and rate."""
+        crush, rate = x[self.ends[:, 0]] - x[self.ends[:, 1]], v[self.ends[:, 0]] - v[self.ends[:, 1]]
+        for k in self.given:
+            crush[k], rate[k] = np.interp(t, self.time, self.crushes[k]), np.interp(t, self.time, self.rates[k])
+        return crush, rate
+
+    def largest(self, peak: np.ndarray, t: float, x: np.ndarray) -> np.ndarray:
+        return np.maximum(peak, self.motion(t, x, x)[0])
+
+    def forces(self, t: float, x: np.ndarray, v: np.ndarray, peak: np.ndarray) -> np.ndarray:
+        crush, rate = self.motion(t, x, v)
+        peak = np.maximum(peak, crush)
+        return np.array([
+            law.spring(c, p) + law.damping * r if law.carries(c, p) else 0.0
+            for law, c, r, p in zip(self.laws, crush, rate, peak)
+        ])  # fmt: skip
+
+    def accelerations(self, t: float, x: np.ndarray, v: np.ndarray, peak: np.ndarray) -> np.ndarray:
+        force, loads = self.forces(t, x, v, peak), np.zeros(len(x))
+        np.subtract.at(loads, self.ends[:, 0], force)
+        np.add.at(loads, self.ends[:, 1], force)
+        acceleration = loads / self.masses
+        for k in self.driven:
+            acceleration[k] = np.interp(t, self.time, self.driving[k])
+        return acceleration
+
+    def step(self, t: float, h: float, x: np.ndarray, v: np.ndarray, peak: np.ndarray) -> tuple[np.ndarray, ...]:
+        """One Runge-Kutta step of h s; the largest crush follows at its end."""
+        a1 = self.accelerations(t, x, v, peak)
+        v2 = v + 0.5 * h * a1
+        a2 = self.accelerations(t + 0.5 * h, x + 0.5 * h * v, v2, peak)
+        v3 = v + 0.5 * h * a2
+        a3 = self.accelerations(t + 0.5 * h, x + 0.5 * h * v2, v3, peak)
+        v4 = v + h * a3
+        a4 = self.accelerations(t + h, x + h * v3, v4, peak)
+        x, v = x + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4), v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+        return x, v, self.largest(peak, t + h, x)
+
+
+def _bridged(values: np.ndarray) -> np.ndarray:
+    """NaN replaced by a straight line between the valid neighbours; 0 where there are none."""
+    valid = np.isfinite(values)
+    k = np.arange(len(values))
+    return np.interp(k, k[valid], values[valid]) if valid.any() else np.zeros(len(values))
+
+
+def compare(
+    structure: Structure, description: Description, run: FreeRun, smooth=lambda values: values
+) -> list[Comparison]:
+    """Every equation's signal and every free body's velocity; `smooth` (a filter) is applied to both signals."""
+    signals = [
+        (name, unit, smooth(run.measured[:, k]), smooth(run.predicted[:, k]))
+        for k, (name, unit) in enumerate(zip(description.equations, description.equation_units))
+    ]
+    signals += [
+        (f"{body.name} velocity", "m/s", run.measured_velocity[:, k], run.velocity[:, k])
+        for k, body in enumerate(structure.bodies)
+        if body.free and body.acceleration
+    ]
+    return [_comparison(*signal) for signal in signals]
+
+
+def _comparison(name: str, unit: str, measured: np.ndarray, simulated: np.ndarray) -> Comparison:
+    valid = np.isfinite(measured) & np.isfinite(simulated)
+    try:
+        rating = rate(measured, simulated)
+    except ValueError:
+        rating = None
+    if not valid.any():
+        return Comparison(name, unit, np.nan, np.nan, np.nan, rating)
+    peaks = [float(s[valid][np.argmax(np.abs(s[valid]))]) for s in (measured, simulated)]
+    return Comparison(name, unit, *peaks, float(np.sqrt(np.mean((measured - simulated)[valid] ** 2))), rating)
