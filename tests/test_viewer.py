@@ -193,7 +193,9 @@ def test_loops_are_the_force_over_the_crush_in_one_line(rrd, crash):
 
 
 def test_axes_of_the_loops_hold_all_of_the_loop(rrd, crash):
-    transforms = [c for c in RrdReader(rrd).stream() if c.entity_path == "/force_crush/cab_barrier/data" and c.is_static]
+    transforms = [
+        c for c in RrdReader(rrd).stream() if c.entity_path == "/force_crush/cab_barrier/data" and c.is_static
+    ]
     scale = values_of(transforms[-1].to_record_batch(), "Transform3D:mat3x3")[-1].reshape(3, 3).T
     right, top = 1e3 * crash.crush[:, 0].max() * scale[0, 0], 1e-3 * crash.force[:, 0].max() * -scale[1, 1]
     assert 0.5 * WIDTH < right <= WIDTH
@@ -291,7 +293,14 @@ def test_the_screenshot_command(rrd, tmp_path, capsys):
 def test_a_killed_viewer_disturbs_nothing(crash, streams, tmp_path):
     path = tmp_path / "killed.rrd"
     target = recorder(path)
-    command = [viewer_binary(), "--headless", "--bind=127.0.0.1", f"--port={usable_port(0)}", "--connect", target.sinks.url]
+    command = [
+        viewer_binary(),
+        "--headless",
+        "--bind=127.0.0.1",
+        f"--port={usable_port(0)}",
+        "--connect",
+        target.sinks.url,
+    ]
     viewer = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     time.sleep(1.0)
     died_early = viewer.poll() is not None
@@ -383,6 +392,28 @@ def test_values_that_are_not_finite_leave_gaps_only(crash, streams, tmp_path):
     assert np.abs(cab).max() < 10
 
 
+def test_a_model_without_springs_is_shown_all_the_same(crash, streams, tmp_path):
+    def bare(block):
+        if isinstance(block, ForceBlock):
+            n = len(block.time_ns)
+            return block._replace(
+                element=(), between=(), crush=np.empty((n, 0)), force=np.empty((n, 0)), state=np.empty((n, 0), int)
+            )
+        if isinstance(block, ParameterBlock):
+            n = len(block.time_ns)
+            return block._replace(
+                name=(), unit=(), value=np.empty((n, 0)), std=np.empty((n, 0)), status=np.empty((n, 0), int)
+            )
+        return block
+
+    said = []
+    target = recorder(tmp_path / "bare.rrd", say=said.append)
+    feed(target, crash, {name: [bare(block) for block in stream] for name, stream in streams.items()})
+    target.close()
+    assert said == []
+    assert rows(tmp_path / "bare.rrd")["/signal/cab/model/mrls"] == len(crash.time_ns)
+
+
 def test_each_pass_is_a_recording_and_one_complete_pass_in_a_file_is_enough(crash, streams, tmp_path):
     path = tmp_path / "loop.rrd"
     target = recorder(path)
@@ -444,7 +475,7 @@ def test_a_port_in_use_is_not_taken():
 
 
 def test_drawing_costs_little(crash, tmp_path):
-    """Per sample and estimator; one sample in a message is the dearest case. Here it takes some 0.1 ms with decoding."""
+    """Per sample and estimator; one sample in a message is the dearest case. Here it takes some 0.1 ms."""
     streams = {name: crash_data.estimates(crash, name, size=1) for name in NAMES}
     target = recorder(tmp_path / "cost.rrd")
     began = time.process_time()
@@ -532,11 +563,20 @@ def test_an_estimate_that_runs_away_does_not_squash_the_plot(streams):
     assert drawn.max() == PREDICTION * np.abs(residuals.measured[:, 0]).max()
     assert_array_equal(np.delete(drawn, 700), np.delete(residuals.predicted[:, 0], 700))
     wild = parameters.value.copy()
-    wild[700, 1] = 1.01 * PARAMETER * np.median(wild[:, 1])
+    wild[700, 1] = 1.01 * PARAMETER * wild[:, 1].max()
     drawn = limits.parameter(parameters._replace(value=wild), 1)
     assert np.flatnonzero(np.isnan(drawn)).tolist() == [700]
     assert limits.force(forces) > np.abs(forces.force).max()
     assert limits.force(forces) < 10 * np.abs(forces.force).max()
+
+
+def test_a_stiffness_that_grows_when_contact_begins_is_drawn(streams):
+    """Long before it nothing but the first guess was there; it must not count as what the stiffness usually is."""
+    parameters = join(streams["mrls"])[0]
+    value, std = np.full_like(parameters.value, 50.0), np.full_like(parameters.value, 50.0)
+    value[1200:], std[1200:] = 400.0, 10.0
+    drawn = Limits().parameter(parameters._replace(value=value, std=std), 0)
+    assert_array_equal(drawn, value[:, 0])
 
 
 def test_forces_of_light_bodies_are_in_newton(cast):

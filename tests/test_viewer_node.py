@@ -163,6 +163,20 @@ def test_it_finds_the_estimators_and_ends_with_the_replay(stage, crash, streams,
     assert output == f"wrote {rrd}: ckf 600 of 600 samples, mrls 600 of 600 samples\n"
 
 
+def test_a_window_that_cannot_open_is_said_and_disturbs_nothing(stage, crash, streams, tmp_path, monkeypatch):
+    monkeypatch.setenv("DISPLAY", ":97")  # where no X server is
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    rrd = tmp_path / "window.rrd"
+    viewer = start(rrd, open="true", estimators="[mrls, ckf]", exit_when_finished="true")
+    stage.play(crash, streams)
+    time.sleep(1.0)
+    stage.state.publish(msg.ReplayState(state=msg.ReplayState.FINISHED))
+    output, errors = end(viewer, timeout=15.0)
+    assert "viewer opened on rerun+http://127.0.0.1:" in errors
+    assert "could not run; look at it live with: rerun --connect rerun+http://127.0.0.1:" in errors
+    assert "600 of 600" in output
+
+
 def test_it_ends_at_once_where_nothing_was_played(stage, tmp_path):
     viewer = start(tmp_path / "empty.rrd", estimators="[mrls]")
     wait_until(lambda: stage.out["mrls", "forces"].get_subscription_count() == 1, "the viewer subscribes")

@@ -100,8 +100,9 @@ class Run:
             for level, text in child.messages():
                 if level in ("WARN", "ERROR", "FATAL") or name == "viewer":
                     self.terminal.say(f"{name}: {text}")
-            early = child.status != 0 or (name != "replay" and self.children["replay"].status is None)
-            if child.status is not None and early and name not in self.dead:
+            status = child.status
+            early = bool(status) or (name in self.choices and self.children["replay"].status is None)
+            if status is not None and early and name not in self.dead:
                 self.dead.add(name)
                 self.terminal.say(f"{name} has ended too early: {child.last_words()}")
 

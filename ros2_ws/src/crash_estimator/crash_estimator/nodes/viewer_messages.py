@@ -13,16 +13,17 @@ def test_block(message: TestInfo) -> TestBlock:
 def parameter_block(estimator: str, message: Parameters) -> ParameterBlock:
     names = tuple(message.name)
     return ParameterBlock(
-        *_head(estimator, message), names, tuple(message.unit), **_tables(message, len(names), ("value", "std", "status"))
+        *_head(estimator, message),
+        names,
+        tuple(message.unit),
+        **_tables(message, len(names), ("value", "std", "status")),
     )
 
 
 def residual_block(estimator: str, message: Residuals) -> ResidualBlock:
     names = tuple(message.name)
     fields = ("measured", "predicted", "innovation", "innovation_std", "residual", "residual_std")
-    return ResidualBlock(
-        *_head(estimator, message), names, tuple(message.unit), **_tables(message, len(names), fields)
-    )
+    return ResidualBlock(*_head(estimator, message), names, tuple(message.unit), **_tables(message, len(names), fields))
 
 
 def force_block(estimator: str, message: Forces) -> ForceBlock:
@@ -39,9 +40,7 @@ def force_block(estimator: str, message: Forces) -> ForceBlock:
 
 
 def event_block(estimator: str, message: Event) -> EventBlock:
-    return EventBlock(
-        estimator, message.run, message.number, message.time, message.kind, message.target, message.text
-    )
+    return EventBlock(estimator, message.run, message.number, message.time, message.kind, message.target, message.text)
 
 
 BLOCK_OF = {

@@ -5,6 +5,7 @@ only queue what comes; decoding, drawing and waiting for a slow screen happen in
 """
 
 import os
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Hashable
@@ -40,24 +41,27 @@ class ViewerNode(Node):
     def __init__(self) -> None:
         super().__init__("viewer")
         say = self.get_logger().info
-        self.estimators = [n for n in self._declared("estimators", [""], "names of estimators; empty: all there are") if n]
+        names = self._declared("estimators", [""], "names of estimators; empty: all there are")
+        self.estimators = [name for name in names if name]
         port = self._declared("port", 9876, "of the gRPC server on 127.0.0.1 that viewers connect to")
         rrd = self._declared("rrd", "crash.rrd", "file that the recording is written to; empty: none")
         memory = self._declared("memory_limit", "1GiB", "what the server keeps for viewers that come late")
         wants_window = self._declared("open", True, "open the native viewer where there is a display")
         self.exits = self._declared("exit_when_finished", False, "end with the replay")
         sinks = Sinks(port, rrd, memory)
+        os.nice(10)  # on a busy machine the estimators go first, the picture comes later
+        self.recorder = Recorder(sinks, tuple(self.estimators), say=self.get_logger().warning)
         if sinks.port != port:
             say(f"port {port} is in use, taking {sinks.port}")
+        self.window: subprocess.Popen | None = None
+        self.invitation = f"look at it live with: rerun --connect {sinks.url}"
         if wants_window and has_display():
-            open_viewer(sinks.url)
+            self.window = open_viewer(sinks.url)  # the server is up: a window that comes first would not try again
             say(f"viewer opened on {sinks.url}")
         else:
-            say(f"look at it live with: rerun --connect {sinks.url}")
+            say(self.invitation)
         if sinks.rrd:
             say(f"writing {sinks.rrd}")
-        os.nice(10)  # after the window is open: on a busy machine the estimators go first, the picture comes later
-        self.recorder = Recorder(sinks, tuple(self.estimators), say=self.get_logger().warning)
         self.done = Future()
         self.finished = False
         self.counted: Subscription | None = None
@@ -95,6 +99,9 @@ class ViewerNode(Node):
             for name in sorted(self._estimators_around() - self.followed):
                 self._follow(name)
         self._be_counted()
+        if self.window and self.window.poll() is not None:
+            self.get_logger().info(f"the viewer was closed or could not run; {self.invitation}")
+            self.window = None
         quiet = time.monotonic() - self.recorder.last_put > QUIET
         if self.exits and self.finished and self.recorder.idle and (self.recorder.complete or quiet):
             self.done.set_result(None)

@@ -74,8 +74,10 @@ def residual_views(cast: Cast, kind: str = "residual") -> list[rrb.View]:
 
 def parameter_views(cast: Cast) -> list[rrb.View]:
     """Each parameter of any model with all estimators of it."""
+    corner = rrb.Corner2D.LeftTop  # before the impact, where it is not known yet
     return [
-        _plot(path("parameter", name), f"{name} and its ± σ band, {cast.shown(unit).unit}") for name, unit in cast.parameters
+        _plot(path("parameter", name), f"{name} and its ± σ band, {cast.shown(unit).unit}", corner)
+        for name, unit in cast.parameters
     ]
 
 
@@ -108,4 +110,3 @@ def _plot(origin: str, name: str, corner: rrb.Corner2D = rrb.Corner2D.RightTop) 
 
 def _quantity(unit: str) -> str:
     return "force" if unit == "N" else "acceleration"
-

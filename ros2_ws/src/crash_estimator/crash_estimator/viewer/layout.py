@@ -57,7 +57,9 @@ def force_crush(cast: Cast) -> rrb.Container:
 
 
 def motion(cast: Cast) -> rrb.Container:
-    return rrb.Vertical(motion_view(cast), state_view(), row_shares=_above_lanes(cast, most=0.45), name="Motion and states")
+    return rrb.Vertical(
+        motion_view(cast), state_view(), row_shares=_above_lanes(cast, most=0.45), name="Motion and states"
+    )
 
 
 def events(cast: Cast) -> rrb.Container:
@@ -94,6 +96,6 @@ def first_elements(cast: Cast) -> list[str]:
 
 
 def _above_lanes(cast: Cast, most: float) -> list[float]:
-    """Shares of a tab's height for what stands above the state lanes, and for the lanes: what they need, up to `most`."""
+    """Shares of a tab's height for what stands above the state lanes, and for the lanes, which get up to `most`."""
     lanes = min(0.06 + 0.05 * sum(len(m.elements) for m in cast.members), most)
     return [1 - lanes, lanes]

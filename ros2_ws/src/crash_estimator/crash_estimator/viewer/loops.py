@@ -111,7 +111,9 @@ class Loops:
         self.pen.static(f"{root}/grid", rr.LineStrips2D(grid, colors=[GRID], radii=points(0.4), draw_order=1.0))
         self.pen.static(f"{root}/zero", rr.LineStrips2D(zero, colors=[INK], radii=points(0.6), draw_order=2.0))
         at = [(u, 0.01) for u in across] + [(-0.09, v - 0.06) for v in up]
-        self.pen.labels(f"{root}/ticks", at, [text(v, x.step) for v in x.ticks] + [text(v, y.step) for v in y.ticks], INK)
+        self.pen.labels(
+            f"{root}/ticks", at, [text(v, x.step) for v in x.ticks] + [text(v, y.step) for v in y.ticks], INK
+        )
         at = [(WIDTH / 2, 0.11), (0.02, -HEIGHT - 1.4 * LINE)]
         self.pen.labels(f"{root}/titles", at, ["crush, mm", force], TITLE)
 

@@ -47,7 +47,9 @@ class Pen:
         time = np.asarray(time_ns, dtype=np.int64).view("timedelta64[ns]")
         self.recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time)], columns)
 
-    def curve(self, entity: str, time_ns: np.ndarray, values: np.ndarray, name: str, color: Color, width: float) -> None:
+    def curve(
+        self, entity: str, time_ns: np.ndarray, values: np.ndarray, name: str, color: Color, width: float
+    ) -> None:
         """A line in a time plot; NaN leaves a gap."""
         self.once(
             entity, lambda: rr.SeriesLines(colors=[color], names=[name], widths=[width], aggregation_policy="MinMax")

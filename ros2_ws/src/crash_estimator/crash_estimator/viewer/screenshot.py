@@ -25,7 +25,11 @@ class ScreenshotError(RuntimeError):
 
 
 def screenshot(
-    rrd: str | Path, png: str | Path, at: float | None = None, size: tuple[int, int] = (1600, 900), patience: float = 60.0
+    rrd: str | Path,
+    png: str | Path,
+    at: float | None = None,
+    size: tuple[int, int] = (1600, 900),
+    patience: float = 60.0,
 ) -> None:
     """Draw a recording as the viewer would show it, the time cursor at `at` s since the impact (None: at the end).
 
@@ -35,7 +39,13 @@ def screenshot(
     if not rrd.is_file():
         raise ScreenshotError(f"{rrd}: no such recording")
     port = usable_port(0)
-    command = [viewer_binary(), "--headless", f"--window-size={size[0]}x{size[1]}", "--bind=127.0.0.1", f"--port={port}"]
+    command = [
+        viewer_binary(),
+        "--headless",
+        f"--window-size={size[0]}x{size[1]}",
+        "--bind=127.0.0.1",
+        f"--port={port}",
+    ]
     quiet = {**os.environ, "RUST_LOG": "error", "RERUN_APP_ONLY": "true"}  # messages would pop up in the picture
     process = subprocess.Popen(
         [*command, "--hide-welcome-screen"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=quiet

@@ -51,12 +51,14 @@ class Summary:
         lines.append(_row("method", [m.method for m in cast.members]))
         lines.append(_group("RMS residual", len(names)))
         for body, unit in cast.equations:
-            lines.append(_row(f"{body}, {cast.shown(unit).unit}", [self._rms(name, body, cast.shown(unit).factor) for name in names]))
+            shown = cast.shown(unit)
+            lines.append(_row(f"{body}, {shown.unit}", [self._rms(name, body, shown.factor) for name in names]))
         lines.append(_group("parameter ± σ", len(names)))
         for parameter, unit in cast.parameters:
-            cells = [self._parameter(name, parameter, cast.shown(unit).factor) for name in names]
+            shown = cast.shown(unit)
+            cells = [self._parameter(name, parameter, shown.factor) for name in names]
             symbol = parameter.replace(".stiffness", " K").replace(".damping", " C")
-            lines.append(_row(f"{symbol}, {cast.shown(unit).unit}", cells))
+            lines.append(_row(f"{symbol}, {shown.unit}", cells))
         lines.append(_group("inside the 99 % band", len(names)))
         for body, _ in cast.equations:
             lines.append(_row(body, [self._inside(name, body) for name in names]))
