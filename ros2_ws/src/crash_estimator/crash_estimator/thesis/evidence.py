@@ -33,7 +33,7 @@ SEEDS = 3
 
 
 def forces() -> str:
-    """Rms error of the element forces against the truth, share of each one's peak: the largest of a model's elements."""
+    """Rms error of the element forces, share of each one's true peak: the largest of a model's elements."""
     rows = []
     for name, (model, end) in SIMULATED.items():
         structure, errors = load_model(model), {method: [] for method in METHODS}
