@@ -4,12 +4,18 @@ Cab 1300 kg, engine 400 kg, 16 m/s. Springs cab-barrier, engine-barrier and cab-
 tension; integrated here with the explicit midpoint rule. An "estimator" is the truth with an error that dies away.
 """
 
+import time
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from rerun.chunk import RrdReader
 
 from crash_estimator.viewer.blocks import Block, EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock
+from crash_estimator.viewer.recorder import Recorder
+from crash_estimator.viewer.sinks import Sinks
 
+NAMES = ("mrls", "ckf")
 MASSES = np.array([1300.0, 400.0])
 STIFFNESS = np.array([4.0e5, 9.0e5, 6.0e5])  # cab_barrier, engine_barrier, cab_engine, N/m
 ELEMENTS = ("cab_barrier", "engine_barrier", "cab_engine")
@@ -128,3 +134,71 @@ def events(crash: Crash, estimator: str, run: int = 0) -> list[EventBlock]:
                 )
             )
     return found
+
+
+def two_streams(crash: Crash, size: int = 50) -> dict[str, list[Block]]:
+    """Blocks of two estimators, one starting 30 % too stiff, one 20 % too soft."""
+    settings = zip(NAMES, (0.3, -0.2), (1, 2))
+    return {name: estimates(crash, name, error, size=size, seed=seed) for name, error, seed in settings}
+
+
+def recorder(rrd: Path | str, **settings) -> Recorder:
+    """A recorder that expects both estimators, its server on a free port."""
+    return Recorder(Sinks(0, rrd), NAMES, **settings)
+
+
+def feed(target: Recorder, crash: Crash, streams: dict[str, list], run: int = 0, batches: int = 5) -> None:
+    """All blocks as a replay would bring them, in some batches, events last."""
+    target.put(lambda: test_block(crash))
+    count = len(streams[NAMES[0]])
+    for i in range(count):
+        for name in NAMES:
+            target.put(lambda block=streams[name][i]: block._replace(run=run))
+        if i % (count // batches) == 0:
+            settle(target)
+    for name in NAMES:
+        for event in events(crash, name, run):
+            target.put(lambda event=event: event)
+    settle(target)
+
+
+def settle(target: Recorder, patience: float = 20.0) -> None:
+    deadline = time.monotonic() + patience
+    while not target.idle:
+        assert time.monotonic() < deadline, "the recorder does not come to an end"
+        time.sleep(0.01)
+
+
+def rows(path: Path) -> dict[str, int]:
+    """Temporal rows of every entity of a recording."""
+    found: dict[str, int] = {}
+    for chunk in RrdReader(path).stream():
+        if not chunk.is_static:
+            found[chunk.entity_path] = found.get(chunk.entity_path, 0) + chunk.num_rows
+    return found
+
+
+def column(path: Path, entity: str, component: str) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Times (ns) and flat values of a component of an entity, in order of time."""
+    rows_: list[tuple[int, np.ndarray]] = []
+    for chunk in RrdReader(path).stream():
+        if chunk.entity_path == entity and not chunk.is_static:
+            batch = chunk.to_record_batch()
+            times = batch.column("crash_time").cast("int64").to_pylist()
+            rows_ += zip(times, values_of(batch, component))
+    rows_.sort(key=lambda row: row[0])
+    return np.array([time_ns for time_ns, _ in rows_]), [values for _, values in rows_]
+
+
+def values_of(batch, component: str) -> list[np.ndarray]:
+    """Flat values in each row of a record batch; none where it has no such component."""
+    for field, data in zip(batch.schema, batch.columns):
+        if (field.metadata or {}).get(b"rerun:component") == component.encode():
+            return [np.ravel(row) for row in data.to_pylist()]
+    return []
+
+
+def series(path: Path, entity: str, component: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n,) and values (n, width) of a component whose rows are alike."""
+    times, values = column(path, entity, component)
+    return times, np.array(values)

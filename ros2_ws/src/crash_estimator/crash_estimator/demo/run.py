@@ -29,7 +29,7 @@ SILENCE = 3.0
 WRITING = 20.0
 """s that the viewer has to finish its file."""
 LOOK_AT = (
-    ("Overview", "measured and predicted acceleration; below, the residual leaves its 99 % band where a model fails"),
+    ("Overview", "measured and predicted acceleration; beside it, the residual leaves its 99 % band where a model fails"),
     ("Force over crush", "the loop of each element: its slope is the stiffness, what it encloses the absorbed energy"),
     ("Parameters", "stiffness with its sigma; in the lanes below, when each element loads, unloads or is apart"),
     ("Motion and states", "bodies and springs move with the time cursor: drag it through the crash"),
