@@ -1,7 +1,7 @@
-.PHONY: help demo test bags thesis clean
+.PHONY: help demo test bags thesis benchmark-effects clean
 
 help: # what there is to make
-	@sed -n 's/^\([a-z]*\):.*# /make \1	/p' Makefile
+	@sed -n 's/^\([a-z-]*\):.*# /make \1	/p' Makefile
 
 demo: # a crash replayed, estimated and shown in Rerun; of your own with RECORDING=path
 	@tools/run crash_estimator demo $(if $(RECORDING),--recording "$(RECORDING)")
@@ -17,6 +17,9 @@ bags: # the simulated recordings in bags/, made anew
 
 thesis: # the thesis's simulated experiments run again: docs/thesis.md
 	@tools/env python -m crash_estimator.thesis
+
+benchmark-effects: # which hidden effects are found, on 1500 simulated tests: docs/missing-effects.md; ARGS="--cases 20"
+	@tools/env python -m crash_estimator.benchmarks.effects $(ARGS)
 
 clean: # removes what the set-up installed and built, and what the programs wrote
 	rm -rf .venv .setup out ros2_ws/build ros2_ws/install ros2_ws/log

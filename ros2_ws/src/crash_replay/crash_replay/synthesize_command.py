@@ -1,4 +1,8 @@
-"""`synthesize SCENARIO --to BAG`: write a simulated recording, with its truth in a YAML file beside it."""
+"""`synthesize SCENARIO --to BAG`: write a simulated recording, with its truth in a YAML file beside it.
+
+`synthesize STRUCTURE --hide EFFECT[:TARGET] --to BAG`: of a structure drawn at random by its seed, with an effect
+that NAME.model.yaml, beside it too, does not tell of.
+"""
 
 import argparse
 import math
@@ -7,25 +11,38 @@ from collections.abc import Callable
 from pathlib import Path
 
 from .bag import write_bag
-from .recording import RecordingError
+from .recording import Recording, RecordingError
+from .synthetic.hidden.bundled import NAME, bundled_case
+from .synthetic.hidden.cases import EFFECTS, HiddenCase, draw_case
+from .synthetic.hidden.structures import STRUCTURES
 from .synthetic.recordings import BUILDERS, BUNDLED_SEED, SCENARIOS
 from .synthetic.truth_file import truth_text
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="synthesize", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="synthesize", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument(
-        "scenario", nargs="?", metavar="SCENARIO", choices=BUILDERS, help="one of those that --list shows"
-    )
-    what.add_argument("--all", action="store_true", help="every scenario, as in bags/; replaces what is there")
+        "scenario", nargs="?", metavar="SCENARIO", choices=[*BUILDERS, *STRUCTURES],
+        help=f"one of those that --list shows; or, to hide an effect in it, one of {', '.join(STRUCTURES)}",
+    )  # fmt: skip
+    what.add_argument("--all", action="store_true", help="all of bags/; replaces what is there")
     what.add_argument("--list", action="store_true", help="show the scenarios and write nothing")
     parser.add_argument(
         "--to", metavar="BAG", type=Path, help="folder or .mcap file to write; with --all, the folder for all"
     )
+    parser.add_argument(
+        "--hide", action="append", type=_hidden, metavar="EFFECT[:TARGET]",
+        help=f"may be repeated; none, or one of {', '.join(EFFECTS)}; without a target it is drawn",
+    )  # fmt: skip
+    parser.add_argument(
+        "--size", type=_positive, default=1.0, metavar="FACTOR", help="of the hidden effects, times the usual one"
+    )
     parser.add_argument("--force", action="store_true", help="replace BAG where it exists")
     parser.add_argument(
-        "--seed", type=_whole, default=BUNDLED_SEED, metavar="N", help="of the noise (default %(default)s)"
+        "--seed", type=_whole, default=BUNDLED_SEED, metavar="N", help="of the noise and of what is drawn (default %(default)s)"
     )
     parser.add_argument("--rate", type=_positive, metavar="HZ", help="sample rate, instead of the scenario's")
     parser.add_argument(
@@ -38,10 +55,15 @@ def main() -> None:
         return
     if arguments.to is None:
         parser.error("the argument --to is required: where to write")
+    if (arguments.hide is not None) != (arguments.scenario in STRUCTURES):
+        parser.error(f"--hide goes with one of {', '.join(STRUCTURES)}, which need it (none: nothing is hidden)")
     try:
         if arguments.all:
             for name in SCENARIOS:
                 _write(name, arguments.to / f"{name}.mcap", arguments, replace=True)
+            _write_hidden(bundled_case(), arguments.to / f"{NAME}.mcap", arguments, replace=True)
+        elif arguments.hide:
+            _write_hidden(_case(arguments), arguments.to, arguments, arguments.force)
         else:
             _write(arguments.scenario, arguments.to, arguments, arguments.force)
     except (RecordingError, OSError) as error:
@@ -53,10 +75,38 @@ def _write(name: str, path: Path, arguments: argparse.Namespace, replace: bool) 
     recording, truth = SCENARIOS[name](
         arguments.seed, rate=arguments.rate, noise=arguments.noise, speed=arguments.speed
     )
+    _write_files(recording, path, {"truth": truth_text(truth)}, replace)
+
+
+def _case(arguments: argparse.Namespace) -> HiddenCase:
+    chosen = {effect: target for effect, target in arguments.hide if effect != "none"}
+    at = {effect: target for effect, target in chosen.items() if target}
+    return draw_case(arguments.scenario, list(chosen), arguments.seed, arguments.size, at)
+
+
+def _write_hidden(case: HiddenCase, path: Path, arguments: argparse.Namespace, replace: bool) -> None:
+    recorded = {"noise": arguments.noise, "rate": arguments.rate}
+    recording, truth = case.record(arguments.speed, **{k: v for k, v in recorded.items() if v is not None})
+    _write_files(recording, path, {"truth": case.truth_text(truth), "model": case.model_text}, replace)
+
+
+def _write_files(recording: Recording, path: Path, texts: dict[str, str], replace: bool) -> None:
+    """The bag, and NAME.WHAT.yaml beside it."""
     write_bag(recording, path, overwrite=replace)
-    beside = path.parent / f"{path.stem if path.suffix == '.mcap' else path.name}.truth.yaml"
-    beside.write_text(truth_text(truth), encoding="utf-8")
-    print(f"{path}: {len(recording)} samples, {len(recording.test.channels)} channels; truth in {beside.name}")
+    beside = []
+    for what, text in texts.items():
+        beside.append(f"{path.stem if path.suffix == '.mcap' else path.name}.{what}.yaml")
+        (path.parent / beside[-1]).write_text(text, encoding="utf-8")
+    named = ", ".join(f"{what} in {name}" for what, name in zip(texts, beside))
+    print(f"{path}: {len(recording)} samples, {len(recording.test.channels)} channels; {named}")
+
+
+def _hidden(text: str) -> tuple[str, str]:
+    """EFFECT[:TARGET] -> the effect, and its target or nothing."""
+    effect, _, target = text.partition(":")
+    if effect not in ("none", *EFFECTS):
+        raise argparse.ArgumentTypeError(f"expected none or one of {', '.join(EFFECTS)}, got {effect!r}")
+    return effect, target
 
 
 def _number(convert: Callable[[str], float], accept: Callable[[float], bool], expected: str) -> Callable[[str], float]:

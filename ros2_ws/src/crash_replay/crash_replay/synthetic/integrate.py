@@ -1,6 +1,6 @@
 """4th-order Runge-Kutta integration of a system of bodies and elements.
 
-    M_k a_k = sum over elements of -F (where k is body a) or +F (where k is body b)
+    M_k a_k = push_k + sum over elements of -F (where k is body a) or +F (where k is body b)
 
 in fixed steps; driven bodies have their given acceleration instead. An element's largest crush is
 part of the state: within a step it is the larger of the one so far and the present crush, so that
@@ -40,13 +40,17 @@ class History(NamedTuple):
 
 
 class _Equations:
-    """The system's right-hand side, with the driven accelerations tabulated at every half step."""
+    """The system's right-hand side, with what depends on time tabulated at every half step."""
 
     def __init__(self, system: System, grid: np.ndarray):
-        self.masses = [body.mass for body in system.bodies]
-        still = np.zeros(len(grid))
+        self.bodies = len(system.bodies)
+        still, steady = np.zeros(len(grid)), np.ones(len(grid))
         driven = [body.motion.acceleration(grid) if body.motion else still for body in system.bodies]
         self.driven = np.stack(driven, axis=1).tolist()
+        masses = [(body.mass or 0.0) * (body.growth(grid) if body.growth else steady) for body in system.bodies]
+        self.masses = np.stack(masses, axis=1).tolist()
+        pushed = [body.push(grid) if body.push else still for body in system.bodies]
+        self.pushed = np.stack(pushed, axis=1).tolist()
         self.links = [(a, b, element.force) for (a, b), element in zip(system.ends(), system.elements)]
 
     def crush(self, x: list[float]) -> list[float]:
@@ -59,7 +63,7 @@ class _Equations:
         return [law(x[a] - x[b], v[a] - v[b], p) for (a, b, law), p in zip(self.links, self.largest(peak, x))]
 
     def loads(self, forces: list[float]) -> list[float]:
-        loads = [0.0] * len(self.masses)
+        loads = [0.0] * self.bodies
         for (a, b, _), force in zip(self.links, forces):
             loads[a] -= force
             loads[b] += force
@@ -67,7 +71,8 @@ class _Equations:
 
     def accelerations(self, node: int, x: list[float], v: list[float], peak: list[float]) -> list[float]:
         loads = self.loads(self.forces(x, v, peak))
-        return [load / mass if mass else given for load, mass, given in zip(loads, self.masses, self.driven[node])]
+        columns = zip(loads, self.pushed[node], self.masses[node], self.driven[node])
+        return [(load + push) / mass if mass else given for load, push, mass, given in columns]
 
 
 def simulate(system: System, time: np.ndarray, max_step: float = MAX_STEP) -> History:

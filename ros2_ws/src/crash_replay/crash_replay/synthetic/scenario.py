@@ -8,9 +8,9 @@ import numpy as np
 from scipy.constants import g as G
 
 from ..recording import Recording, RecordingError, Test
-from .integrate import History, simulate
+from .integrate import MAX_STEP, History, simulate
 from .sensors import Reading, Sensor, read
-from .system import System
+from .system import Body, Element, System
 from .truth import BodyTruth, ChannelTruth, ElementTruth, body_truths, element_truths
 
 
@@ -25,6 +25,7 @@ class Scenario:
     duration: float  # s after the impact
     before: float = 0.050  # s before it, as in NHTSA tests: its mean gives the zero offset
     rate: float = 10_000.0  # Hz
+    max_step: float = MAX_STEP  # s, of the integration
 
     def at_speed(self, factor: float) -> "Scenario":
         return replace(self, system=self.system.at_speed(factor))
@@ -63,44 +64,67 @@ def record(scenario: Scenario, seed: int) -> tuple[Recording, Truth]:
     before, after = round(scenario.before * rate), round(scenario.duration * rate)
     time_ns = np.rint(np.arange(-before, after + 1) * (1e9 / rate)).astype(np.int64)
     time = time_ns * 1e-9
-    history = _with_time_before(system, simulate(system, time[before:]), time[:before])
-    bodies, elements = body_truths(system, history), element_truths(system, history)
-    signals = [_signal(sensor, bodies, elements) for sensor in scenario.sensors]
+    moving = simulate(system, time[before:], scenario.max_step)
+    quiet = _before(system, moving, time[:before])
+    history = History(*(np.concatenate(columns) for columns in zip(quiet, moving)))
+    seen = signals_of(system, scenario.sensors, time[before:], scenario.max_step, moving)
     readings = [
-        read(sensor, signal, np.random.default_rng([seed, k]))
-        for k, (sensor, signal) in enumerate(zip(scenario.sensors, signals))
+        read(sensor, np.append(_signal(sensor, system, quiet), signal), np.random.default_rng([seed, k]))
+        for k, (sensor, signal) in enumerate(zip(scenario.sensors, seen))
     ]
     channels = {
-        sensor.channel.name: ChannelTruth(signal, reading.noise, reading.offset)
-        for sensor, signal, reading in zip(scenario.sensors, signals, readings)
+        sensor.channel.name: ChannelTruth(_signal(sensor, system, history), reading.noise, reading.offset)
+        for sensor, reading in zip(scenario.sensors, readings)
     }
     values = np.stack([reading.values for reading in readings], axis=1)
-    truth = Truth(scenario, seed, time_ns, bodies, elements, channels)
+    truth = Truth(scenario, seed, time_ns, body_truths(system, history), element_truths(system, history), channels)
     return Recording(_test(scenario, seed, readings), time_ns, values), truth
 
 
-def _with_time_before(system: System, history: History, before: np.ndarray) -> History:
-    """The history with the instants (m,) s before the impact: steady motion, no force."""
+def _before(system: System, history: History, before: np.ndarray) -> History:
+    """The instants (m,) s before the impact that a history begins with: steady motion, no force."""
     velocity = np.tile(history.velocity[0], (len(before), 1))
     displacement = history.displacement[0] + before[:, None] * velocity
     a, b = np.array(system.ends()).T
     still, unloaded = np.zeros_like(velocity), np.zeros((len(before), len(system.elements)))
     crush, rate = displacement[:, a] - displacement[:, b], velocity[:, a] - velocity[:, b]
-    quiet = History(before, displacement, velocity, still, still, crush, rate, unloaded, unloaded)
-    return History(*(np.concatenate(columns) for columns in zip(quiet, history)))
+    return History(before, displacement, velocity, still, still, crush, rate, unloaded, unloaded)
 
 
-def _signal(sensor: Sensor, bodies: dict[str, BodyTruth], elements: dict[str, ElementTruth]) -> np.ndarray:
+def _signal(sensor: Sensor, system: System, history: History) -> np.ndarray:
     match sensor.channel.quantity:
         case "acceleration":
-            return bodies[sensor.of].acceleration
+            return history.acceleration[:, _index(system.bodies, sensor.of)]
         case "force":
-            return bodies[sensor.of].load
+            return history.load[:, _index(system.bodies, sensor.of)]
         case "displacement":
-            return elements[sensor.of].crush
+            return history.crush[:, _index(system.elements, sensor.of)]
         case "velocity":
-            return elements[sensor.of].rate
+            return history.rate[:, _index(system.elements, sensor.of)]
     raise ValueError(f"sensor {sensor.channel.name}: nothing here simulates {sensor.channel.quantity}")
+
+
+def _index(parts: Sequence[Body] | Sequence[Element], name: str) -> int:
+    return [part.name for part in parts].index(name)
+
+
+def signals_of(
+    system: System, sensors: Sequence[Sensor], time: np.ndarray, max_step: float, history: History | None = None
+) -> list[np.ndarray]:
+    """What each sensor sees at the instants `time` (n,) from 0 on, without its noise, offset and quantisation.
+
+    history: what happens at these instants, where it is simulated already. What a late sensor sees is simulated at the instants that it sees: to interpolate would smooth every edge.
+    """
+    histories = {0.0: simulate(system, time, max_step) if history is None else history}
+    signals = []
+    for sensor in sensors:
+        seen = time - sensor.delay
+        if sensor.delay not in histories:
+            histories[sensor.delay] = simulate(system, np.append(0.0, seen[seen > 0.0]), max_step)
+        found = _signal(sensor, system, histories[sensor.delay])
+        signal = np.append(np.zeros(len(time) - len(found) + 1), found[1:]) if sensor.delay else found
+        signals.append(sensor.distortion(time, signal) if sensor.distortion else signal)
+    return signals
 
 
 def _test(scenario: Scenario, seed: int, readings: Sequence[Reading]) -> Test:

@@ -1,8 +1,11 @@
 """Sensors: what a channel records of the true signal.
 
-recorded = step * round(clip(signal + zero offset + white noise, full scale) / step)
+recorded = step * round(clip(seen + zero offset + white noise, full scale) / step)
+
+Seen is the true signal `delay` ago, and then what the sensor's `distortion` makes of it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -23,10 +26,12 @@ class Sensor:
     offset: float = 0.0  # the zero offset is drawn evenly from +- this
     step: float = 0.0  # quantisation; 0 for none
     full_scale: float = np.inf
+    delay: float = 0.0  # s
+    distortion: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None  # (time from zero on, signal) -> seen
 
     def ideal(self) -> "Sensor":
-        """The same sensor without any error."""
-        return Sensor(self.channel, self.of)
+        """The same sensor without noise, offset or quantisation."""
+        return Sensor(self.channel, self.of, delay=self.delay, distortion=self.distortion)
 
     def with_noise(self, noise: float) -> "Sensor":
         return replace(self, noise=noise, noise_share=0.0)

@@ -4,7 +4,7 @@ x is positive in the direction the striking body travels; an element between a a
 X = x_a - x_b, and its force F pushes a back and b forward.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,6 +35,8 @@ class Body:
     velocity: float = 0.0  # m/s at time zero, and before
     displacement: float = 0.0  # m at time zero
     motion: Motion | None = None
+    push: Callable[[np.ndarray], np.ndarray] | None = None  # force on it from outside, N at times in s
+    growth: Callable[[np.ndarray], np.ndarray] | None = None  # its mass at times in s, as a multiple of `mass`
 
     def __post_init__(self):
         if self.mass is not None and not self.mass > 0.0:

@@ -51,13 +51,14 @@ def element_truths(system: System, history: History) -> dict[str, ElementTruth]:
 def _element_truth(element: Element, k: int, history: History) -> ElementTruth:
     crush, rate, peak = history.crush[:, k], history.rate[:, k], history.peak[:, k]
     after = history.time >= 0.0
-    spring_force = np.where(after, _evaluated(element.spring, crush, rate, peak), 0.0)
+    static = getattr(element.spring, "static", element.spring)  # without what depends on the rate
+    spring_force = np.where(after, _evaluated(static, crush, rate, peak), 0.0)
     plastic = getattr(element.spring, "unloading", None) is not None
     on_line = plastic & (crush < peak)
     none = np.abs(crush) < SMALLEST_CRUSH
     lever = np.where(on_line, peak, crush)
     lever = np.where(np.abs(lever) < SMALLEST_CRUSH, SMALLEST_CRUSH, lever)
-    loaded = _evaluated(element.spring, lever, np.zeros(len(lever)), np.maximum(lever, 0.0)) / lever
+    loaded = _evaluated(static, lever, np.zeros(len(lever)), np.maximum(lever, 0.0)) / lever
     apart = ~after | ((spring_force == 0.0) & (~none | on_line))
     unloads = on_line if plastic else crush * rate < 0.0
     return ElementTruth(

@@ -1,11 +1,13 @@
 """NAME.truth.yaml beside a simulated recording: what an estimator should find, in SI units."""
 
+from collections.abc import Mapping
 from io import StringIO
 from typing import Any
 
 from ruamel.yaml import YAML
 
 from .forces import Spring
+from .hidden.laws import Carrier
 from .scenario import Scenario, Truth
 from .system import Body, Element
 
@@ -14,11 +16,16 @@ HEADER = """\
 # X, constant beyond its ends; between its knots scipy's PchipInterpolator. Forces are compression positive.
 """
 
+HEADER_OF_FORCES = """\
+# Here an element's `force` is its static force over the crush; what `hidden` lists comes on top of it.
+"""
 
-def truth_text(truth: Truth) -> str:
-    """The file's text."""
+
+def truth_text(truth: Truth, more: Mapping[str, Any] | None = None) -> str:
+    """The file's text; `more`, such as what is hidden, comes first."""
     scenario = truth.scenario
     content = {
+        **(more or {}),
         "scenario": scenario.name,
         "seed": truth.seed,
         "rate": scenario.rate,
@@ -26,12 +33,16 @@ def truth_text(truth: Truth) -> str:
         "elements": {element.name: _element(element, truth) for element in scenario.system.elements},
         "channels": _channels(scenario, truth),
     }
+    return HEADER + (HEADER_OF_FORCES if more else "") + yaml_text(content)
+
+
+def yaml_text(content: Mapping[str, Any]) -> str:
     yaml = YAML()
     yaml.default_flow_style = None  # leaves on one line
     yaml.width = 110
     text = StringIO()
-    yaml.dump(content, text)
-    return HEADER + text.getvalue()
+    yaml.dump(dict(content), text)
+    return text.getvalue()
 
 
 def _body(body: Body) -> dict[str, Any]:
@@ -54,10 +65,12 @@ def _element(element: Element, truth: Truth) -> dict[str, Any]:
         }
         if element.spring.unloading is not None:
             spring["unloading"] = element.spring.unloading
+    if isinstance(element.spring, Carrier):
+        spring = element.spring.described()
+    spring.setdefault("damping", element.damping)
     return {
         "between": list(element.between),
         **spring,
-        "damping": element.damping,
         "peak": {
             "force": _short(found.force[largest]),
             "time": _short(truth.time_ns[largest] * 1e-9),

@@ -1,0 +1,1 @@
+"""Simulated recordings with a physical effect that their model file does not tell of."""

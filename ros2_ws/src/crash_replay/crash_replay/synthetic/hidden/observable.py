@@ -1,0 +1,94 @@
+"""Where an effect can be told at all: its admissible targets in a specimen, and whether it shows.
+
+Left out, because no method could name them from what is recorded:
+
+- effects on elements that hardly carry (under 15 % of the largest peak force, or under 10 mm of crush);
+- `cubic_stiffness`, `bottoming_out`, `clearance` where the model leaves the element's curve free: such a curve contains
+  a hardening, a stop and a gap. They are hidden where the model says one constant stiffness, or a known one;
+- `plastic_unloading` of an element that has not come down to half of its peak force when the record ends;
+- the car of `single` made heavier, or its barrier's gain wrong: M a = -F and F are all that is measured, so both scale
+  F alike, and its curve is free;
+- with a measured crush (`impactor`) a scale of the only equation M a = F(X, V), F free: `added_mass`, `channel_gain`;
+  a constant in it: `constant_force` is `channel_offset`; a lag in it: `channel_delay` is a damper less;
+- `load_path` in a structure whose bodies are all joined already;
+- whatever moves the recorded accelerations and forces by less than SHOWS in all.
+"""
+
+import numpy as np
+from scipy.constants import g as G
+
+from ..integrate import History, simulate
+from ..scenario import signals_of
+from .specimen import COARSE_RATE, COARSE_STEP, SPEEDS, Peaks, Specimen
+
+CARRIES, MOVES, UNLOADS = 0.15, 0.010, 0.5
+"""Share of the largest peak force; m; share of the peak force that is gone at the end."""
+
+SHOWS = 20.0
+"""Standard deviations: root of the sum over both recordings at 10 kHz of ((with - without) / sensor noise)^2, with the
+effect at its nominal size and 1 g of noise. The structure's own free parameters absorb a part of it."""
+
+ON_ELEMENTS = (
+    "viscous_damping", "quadratic_damping", "coulomb_friction", "rate_hardening", "cubic_stiffness", "bottoming_out",
+    "clearance", "plastic_unloading",
+)  # fmt: skip
+
+NOISE = {"acceleration": 1.0 * G, "force": 3000.0}
+
+NOT_TOLD = {
+    "single": {("added_mass", "car"), ("channel_gain", "barrier_fx")},
+    "impactor": {
+        ("added_mass", "impactor"), ("channel_gain", "impactor_ax"), ("constant_force", "impactor"),
+        ("channel_offset", "impactor_ax"), ("channel_delay", "impactor_ax"),
+    },
+}  # fmt: skip
+
+
+def targets(specimen: Specimen, peaks: Peaks, effect: str) -> list[str]:
+    """Where the effect can be hidden in the specimen; empty where nowhere."""
+    strongest = max(peaks.force.values())
+    carrying = [e for e in peaks.force if peaks.force[e] >= CARRIES * strongest and peaks.travel[e] >= MOVES]
+    pressed = [e for e in carrying if peaks.crush[e] >= MOVES]
+    free = [b.name for b in specimen.scenario.system.bodies if b.mass]
+    channels = {q: [s.channel.name for s in specimen.scenario.sensors if s.channel.quantity == q] for q in NOISE}
+    match effect:
+        case "viscous_damping" | "quadratic_damping" | "coulomb_friction":
+            found = carrying
+        case "rate_hardening":
+            found = pressed
+        case "cubic_stiffness" | "bottoming_out" | "clearance":
+            found = [e for e in pressed if specimen.told(e) != "curve"]
+        case "plastic_unloading":
+            found = [e for e in pressed if peaks.drop[e] >= UNLOADS]
+        case "load_path":
+            found = ["-".join(pair) for pair in specimen.pairs]
+        case "unmodelled_body":
+            axis = specimen.scenario.sensors[0].channel.axis
+            found = [f"extra_a{axis}"]
+        case "channel_delay" | "channel_gain":
+            found = channels["acceleration"] + channels["force"]
+        case "channel_offset":
+            found = channels["acceleration"]
+        case _:
+            found = free
+    return [target for target in found if (effect, target) not in NOT_TOLD.get(specimen.name, ())]
+
+
+def distance(specimen: Specimen, other: Specimen) -> float:
+    """Standard deviations between what the sensors of two specimens record, without noise; see SHOWS."""
+    total = 0.0
+    for ours, theirs in zip(_recorded(specimen), _recorded(other)):
+        total += sum(np.sum((ours[c] - theirs[c]) ** 2) for c in ours.keys() & theirs.keys())
+    return float(np.sqrt(total * specimen.scenario.rate / COARSE_RATE))
+
+
+def _recorded(specimen: Specimen) -> list[dict[str, np.ndarray]]:
+    """At each speed, channel -> (n,) signal in standard deviations of its noise."""
+    scenario = specimen.scenario
+    time = np.arange(0.0, scenario.duration, 1.0 / COARSE_RATE)
+    sensors = [s for s in scenario.sensors if s.channel.quantity in NOISE]
+    runs = []
+    for speed in SPEEDS:
+        signals = signals_of(scenario.system.at_speed(speed), sensors, time, COARSE_STEP)
+        runs.append({s.channel.name: x / NOISE[s.channel.quantity] for s, x in zip(sensors, signals)})
+    return runs
