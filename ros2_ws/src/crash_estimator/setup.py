@@ -16,6 +16,8 @@ setup(
     entry_points={
         "console_scripts": [
             "demo = crash_estimator.demo.command:main",
+            "diagnose = crash_estimator.cli.diagnose:main",
+            "diagnosis = crash_estimator.nodes.diagnosis_node:main",
             "estimate = crash_estimator.cli.estimate:main",
             "estimator = crash_estimator.nodes.estimator_node:main",
             "report = crash_estimator.cli.report:main",

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFlo
 
 from crash_replay.yaml_schema import load_yaml
 
-from .core.structure import Body, Coefficient, Element, ModelError, Structure, Term
+from .core.structure import Body, Coefficient, EffectSpec, Element, ModelError, Structure, Term
 
 
 class Part(BaseModel):
@@ -139,16 +139,47 @@ class ElementPart(Part):
         )
 
 
+class EffectPart(Part):
+    """`{type: coulomb_friction, element: door_rib}`; what the target is depends on the type."""
+
+    type: str
+    element: str | None = None
+    body: str | None = None
+    channel: str | None = None
+    between: tuple[str, str] | None = None
+    coefficient: float | None = None
+    shape: dict[str, float] = {}
+    host: str | None = None
+    touches: str | None = None
+    taken_from: str | None = None
+    variant: Literal["", "absolute", "one_way", "one_way_back"] = ""
+
+    @model_validator(mode="after")
+    def _one_target(self):
+        given = [name for name in ("element", "body", "channel", "between") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError("give one target: `element`, `body`, `channel` or `between: [a, b]`")
+        return self
+
+    def effect(self) -> EffectSpec:
+        target = self.element or self.body or self.channel or "-".join(self.between)
+        return EffectSpec(
+            self.type, target, self.coefficient, self.shape, self.host, self.touches, self.taken_from, self.variant
+        )
+
+
 class ModelFile(Part):
     name: str = Field(min_length=1)
     bodies: dict[str, BodyPart] = Field(min_length=1)
     elements: dict[str, ElementPart] = Field(min_length=1)
+    effects: list[EffectPart] = []
 
     def structure(self) -> Structure:
         return Structure(
             self.name,
             tuple(part.body(name) for name, part in self.bodies.items()),
             tuple(part.element(name) for name, part in self.elements.items()),
+            tuple(part.effect() for part in self.effects),
         )
 
 
@@ -158,21 +189,27 @@ def ready_models() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
 
 
+def model_path(name_or_path: str | Path) -> Path:
+    """The file of a ready model by its name, or the path itself."""
+    path = Path(name_or_path)
+    if path.suffix in (".yaml", ".yml"):
+        return path
+    ready = ready_models()
+    if str(name_or_path) not in ready:
+        near = get_close_matches(str(name_or_path), ready, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise ModelError(
+            f"there is no model {str(name_or_path)!r}: give one of {', '.join(ready)}, or the path of a .yaml file{hint}"
+        )
+    return ready[str(name_or_path)]
+
+
 def load_model(name_or_path: str | Path) -> Structure:
     """A ready model by its name, or a model file by its path.
 
     Raises ModelError with one line that names the file, the line and the key.
     """
-    path = Path(name_or_path)
-    if path.suffix not in (".yaml", ".yml"):
-        ready = ready_models()
-        if str(name_or_path) not in ready:
-            near = get_close_matches(str(name_or_path), ready, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise ModelError(
-                f"there is no model {str(name_or_path)!r}: give one of {', '.join(ready)}, or the path of a .yaml file{hint}"
-            )
-        path = ready[str(name_or_path)]
+    path = model_path(name_or_path)
     try:
         return load_yaml(path, ModelFile).structure()
     except ModelError as error:

@@ -10,8 +10,8 @@ A free body gives one equation, divided by its mass so that measured, predicted 
 the accelerometer's m/s^2; a fixed body with a measured force gives another, in N, the force on it.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
 
@@ -89,6 +89,20 @@ class Element:
 
 
 @dataclass(frozen=True)
+class EffectSpec:
+    """A physical effect beside the springs and dampers; types and what they need are in `core.effects`."""
+
+    type: str
+    target: str  # element, body or channel; "body_a-body_b" for a load path
+    coefficient: float | None = None  # where it starts; None: found from the data
+    shape: Mapping[str, float] = field(default_factory=dict)  # shape constants, likewise
+    host: str | None = None  # unmodelled_body: the body that feels its inertia
+    touches: str | None = None  # unmodelled_body: the body that it pushes by a curve of its own
+    taken_from: str | None = None  # unmodelled_body: the body whose mass it was counted in
+    variant: str = ""  # load_path: "", "absolute", "one_way" or "one_way_back"
+
+
+@dataclass(frozen=True)
 class Parameter:
     """One entry of theta: a coefficient with its name, unit and scale."""
 
@@ -109,6 +123,7 @@ class Structure:
     name: str
     bodies: tuple[Body, ...]
     elements: tuple[Element, ...]
+    effects: tuple[EffectSpec, ...] = ()
 
     def __post_init__(self):
         for element in self.elements:

@@ -1,0 +1,73 @@
+"""`diagnose BAG [BAG ...] --model M`: which physical effect is missing from a model, by one or more recordings."""
+
+import argparse
+import sys
+from itertools import permutations
+from pathlib import Path
+
+from ruamel.yaml import YAML
+
+from crash_replay.bag import read_bag
+
+from ..core.diagnosis.additions import key_of
+from ..core.diagnosis.diagnosis import Diagnosis, diagnose
+from ..core.effects import EFFECTS
+from ..core.effects.base import Effect
+from ..core.effects.user import load_effects
+from ..core.structure import EffectSpec
+from ..diagnosis_tables import diagnosis_tables
+from ..model_file import load_model, model_path, ready_models
+from .common import guarded, write_json
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="diagnose", description=__doc__)
+    parser.add_argument("bags", nargs="+", metavar="BAG", help="recordings of the same structure, best at different speeds")
+    parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
+    parser.add_argument("--apply", metavar="NEW_MODEL.yaml", help="write the model with the effects that were found")
+    parser.add_argument("--json", metavar="FILE", help="write everything that was found")
+    parser.add_argument("--effects", metavar="FILE.py", help="your own effects; the file is executed")
+    arguments = parser.parse_args()
+    sys.exit(guarded(lambda: run(arguments)))
+
+
+def run(arguments: argparse.Namespace) -> None:
+    effects = EFFECTS | (load_effects(arguments.effects) if arguments.effects else {})
+    structure = load_model(arguments.model)
+    found = diagnose(structure, [read_bag(bag) for bag in arguments.bags], effects)
+    print(f"{found.text}\n\n{diagnosis_tables(found)}")
+    if arguments.json:
+        write_json(arguments.json, found.as_json())
+    if arguments.apply:
+        added = apply(found, structure.effects, effects, arguments.model, arguments.apply)
+        print(f"\n{arguments.apply}: {arguments.model} with {added or 'nothing added'}")
+
+
+def apply(found: Diagnosis, had: tuple[EffectSpec, ...], effects: dict[str, Effect], model: str, target: str) -> str:
+    """Write the model's file, comments and all, with the added effects at its end -> what was added."""
+    yaml = YAML()
+    content = yaml.load(model_path(model).read_text(encoding="utf-8"))
+    added = found.structure.effects[len(had) :]
+    if added:
+        content.setdefault("effects", [])
+        content["effects"].extend(_entry(spec, effects[spec.type], list(content["bodies"])) for spec in added)
+    with Path(target).open("w", encoding="utf-8") as file:
+        yaml.dump(content, file)
+    return ", ".join(f"{spec.type} on {spec.target}" for spec in added)
+
+
+def _entry(spec: EffectSpec, effect: Effect, bodies: list[str]) -> dict:
+    key = key_of(effect)
+    entry: dict = {"type": spec.type, key: spec.target}
+    if key == "between":
+        pair = next(p for p in permutations(bodies, 2) if "-".join(p) == spec.target)
+        entry[key] = list(pair)
+    if spec.coefficient is not None:
+        entry["coefficient"] = float(f"{spec.coefficient:.6g}")
+    if spec.shape:
+        entry["shape"] = {name: float(f"{value:.6g}") for name, value in spec.shape.items()}
+    return entry | {name: value for name in ("host", "touches", "taken_from", "variant") if (value := getattr(spec, name))}
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Which physical effect is missing (`diagnose`), and where a model fails."""

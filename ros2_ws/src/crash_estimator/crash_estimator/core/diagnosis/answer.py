@@ -1,0 +1,163 @@
+"""The ranking and the steps of a diagnosis, in the terms of its contract."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..effects.base import StaticFactor
+from .assess import Left, assess, noise_floor
+from .fit import Fit
+from .layout import Layout, Place
+from .records import Record
+from .search import GAIN, Model, Round, Tried
+
+CONFOUNDED = 6.0
+"""Nats: evidences closer than this do not tell two candidates apart."""
+
+BALANCE_WINDOW = 4e-3
+"""s: means over it keep what CFC 60 keeps, the band in which the forces on a barrier and inertias are compared."""
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One candidate."""
+
+    effect: str
+    target: str
+    coefficient: float
+    std: float
+    unit: str
+    evidence: float  # nats gained over the model without it
+    explained: float  # share of the residual's variance that it removes
+    identifiable: bool
+    confounded_with: tuple[str, ...]  # "effect on target"
+    shape: dict[str, float] = field(default_factory=dict)  # shape constants found
+    fitted: bool = True  # False: screened only; its evidence is an estimate
+
+    @property
+    def name(self) -> str:
+        return f"{self.effect} on {self.target}"
+
+    def as_json(self) -> dict:
+        return vars(self) | {"confounded_with": list(self.confounded_with)}
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """One effect added, with the fit before and after it."""
+
+    effect: str
+    target: str
+    coefficient: float
+    std: float
+    unit: str
+    evidence: float
+    explained: float
+    shape: dict[str, float]
+    residual_rms: dict
+    free_run_rms: dict
+    force_explained: dict[str, dict]  # per measured force: share explained by the inertias, before and after
+
+    def as_json(self) -> dict:
+        return vars(self)
+
+
+def stated(place: Place, fitted: Fit) -> tuple[float, float, dict[str, float]]:
+    """An effect's coefficient as the literature states it, its standard deviation, and its shape constants."""
+    theta, covariance = fitted.theta, fitted.covariance
+    shapes = {name: float(np.exp(theta[p])) for name, p in place.shapes.items()}
+    effect, c = place.addition.effect, float(theta[place.coefficient])
+    if not isinstance(effect, StaticFactor):
+        return c, float(np.sqrt(covariance[place.coefficient, place.coefficient])), shapes
+    parameters = [place.coefficient, *place.shapes.values()]
+
+    def value(moved: np.ndarray) -> float:
+        return effect.stated(moved[0], **dict(zip(shapes, np.exp(moved[1:]))))
+
+    at = theta[parameters]
+    steps = np.maximum(1e-4 * np.abs(at), 1e-12)
+    gradient = [(value(at + s * e) - value(at - s * e)) / (2.0 * s) for s, e in zip(steps, np.eye(len(at)))]
+    if not np.isfinite(gradient).all():  # next to nothing, stated as one over it
+        return value(at), np.inf, shapes
+    variance = float(np.array(gradient) @ covariance[np.ix_(parameters, parameters)] @ np.array(gradient))
+    return value(at), float(np.sqrt(max(variance, 0.0))), shapes
+
+
+def place_of(layout: Layout, tried: Tried) -> Place:
+    return next(place for place in layout.places if place.addition.key == tried.addition.key)
+
+
+def ranking_of(round_: Round, recordings: int) -> tuple[Ranked, ...]:
+    """Candidates that gain anything, and at least the best three."""
+    shown = [t for k, t in enumerate(round_.tried) if t.gain > 0.0 or k < 3]
+    return tuple(_ranked(tried, round_, shown) for tried in shown)
+
+
+def _ranked(tried: Tried, round_: Round, shown: list[Tried]) -> Ranked:
+    effect, target = tried.addition.key
+    rivals = tuple(
+        " on ".join(other.addition.key)
+        for other in shown
+        if other is not tried and other.fit and tried.fit and tried.gain > GAIN and abs(other.gain - tried.gain) < CONFOUNDED
+    )
+    before = round_.before.fit.cost
+    if tried.fit is None:
+        explained = min(max(2.0 * tried.gain / before, 0.0), 1.0)
+        screened = tried.screened
+        value, std, shape = screened.coefficient, screened.std, dict(tried.addition.shapes)
+        if tried.addition.coefficient is not None:
+            value, std = tried.addition.coefficient, np.inf
+        elif isinstance(tried.addition.effect, StaticFactor):
+            value, std = tried.addition.effect.stated(value, **tried.addition.shapes), np.inf
+    else:
+        left = assess(tried.fit, round_.before.records)
+        explained = float(np.clip(1.0 - left.cost / round_.before.left.cost, 0.0, 1.0))
+        value, std, shape = stated(place_of(tried.fit.layout, tried), tried.fit)
+    return Ranked(
+        effect, target, value, std, tried.addition.effect.unit, float(tried.gain), explained, not rivals, rivals, shape,
+        tried.fit is not None,
+    )  # fmt: skip
+
+
+def step_of(round_: Round, before: Model, after: Model, free_run: tuple[float, float]) -> StepReport:
+    """free_run: RMS of the two models' free runs."""
+    tried = round_.tried[0]
+    value, std, shape = stated(place_of(after.fit.layout, tried), after.fit)
+    floor = noise_floor(before.fit.layout, before.records)
+    return StepReport(
+        *tried.addition.key, value, std, tried.addition.effect.unit, float(tried.gain),
+        explained=float(np.clip(1.0 - after.left.cost / before.left.cost, 0.0, 1.0)),
+        shape=shape,
+        residual_rms={"before": before.left.rms, "after": after.left.rms, "noise_floor": floor, "unit": "m/s^2"},
+        free_run_rms={"before": free_run[0], "after": free_run[1]},
+        force_explained=_force_explained(before, after),
+    )  # fmt: skip
+
+
+def _force_explained(before: Model, after: Model) -> dict[str, dict]:
+    """Share of each measured force's variance that the measured accelerations of all masses explain."""
+    found = {}
+    layout = before.fit.layout
+    fixed = [q for q, output in enumerate(layout.outputs) if output.fixed]
+    free = [output.body for output in layout.outputs if not output.fixed]
+    every = [k for k, body in enumerate(layout.structure.bodies) if body.free]
+    if len(fixed) != 1 or set(free) != set(every):
+        return found
+    shares = [[_balance(model, record, r, fixed[0]) for r, record in enumerate(model.records)] for model in (before, after)]
+    found[layout.outputs[fixed[0]].channel] = {"before": float(np.mean(shares[0])), "after": float(np.mean(shares[1]))}
+    return found
+
+
+def _balance(model: Model, record: Record, r: int, row: int) -> float:
+    """1 - var(F + sum M a) / var(F), in means over a short window."""
+    from .linearise import balance_of  # noqa: PLC0415
+
+    force = record.measured[:, row]
+    predicted = balance_of(model.fit.layout, record, model.fit.theta)[record.at]
+    length = max(int(round(BALANCE_WINDOW / float(np.median(np.diff(record.time[record.at]))))), 1)
+    window = np.full(length, 1.0 / length)
+    smooth = [np.convolve(np.nan_to_num(x), window, "same") for x in (force, force - predicted)]
+    return float(1.0 - np.var(smooth[1]) / np.var(smooth[0]))
+
+
+__all__ = ["Left", "Ranked", "StepReport", "ranking_of", "stated", "step_of"]

@@ -1,0 +1,81 @@
+"""What a fit leaves: residuals, their size against the noise floor, and whether they are white."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .fit import Fit, advance
+from .layout import Layout
+from .linearise import linearise, motion_of, predicted
+from .linkforce import LinkForce
+from .records import Record
+from .trajectory import Trajectory
+from .whiteness import Whiteness, whiteness
+
+SIMULATION_STEPS = 8
+SIMULATED = 1e-6
+"""Change of the accelerations, as a share of the largest, at which a simulation is done."""
+
+
+class Left(NamedTuple):
+    """Residuals of one model on all records."""
+
+    predicted: tuple[np.ndarray, ...]  # per record (n, q) SI
+    residual: tuple[np.ndarray, ...]  # per record (n, q) SI, measured minus predicted; NaN where not valid
+    links: tuple[list[LinkForce], ...]
+    whiteness: Whiteness
+    rms: float  # m/s^2
+    cost: float  # mean square in units of the noise
+
+
+def output_scale(layout: Layout) -> np.ndarray:
+    """(q,) from each output's unit to m/s^2: a force counts divided by the mass of all free bodies."""
+    mass = sum(body.mass for body in layout.structure.bodies if body.free) or 1.0
+    return np.array([1.0 / mass if output.fixed else 1.0 for output in layout.outputs])
+
+
+def rms(layout: Layout, values: Sequence[np.ndarray]) -> float:
+    """Root mean square over all outputs and records, m/s^2."""
+    scaled = np.concatenate([(v * output_scale(layout)).ravel() for v in values])
+    return float(np.sqrt(np.nanmean(scaled**2)))
+
+
+def noise_floor(layout: Layout, records: Sequence[Record]) -> float:
+    """The RMS that the sensors' noise alone leaves, m/s^2."""
+    return rms(layout, [np.where(np.isfinite(r.measured), r.noise, np.nan) for r in records])
+
+
+def assess(fitted: Fit, records: Sequence[Record]) -> Left:
+    return _left(fitted.layout, records, fitted.theta, fitted.trajectories)
+
+
+def _left(layout: Layout, records: Sequence[Record], theta: np.ndarray, trajectories: Sequence[Trajectory]) -> Left:
+    outputs, residuals, links = [], [], []
+    for r, (record, trajectory) in enumerate(zip(records, trajectories)):
+        equations = linearise(layout, record, r, theta, trajectory)
+        output = predicted(layout, record, r, theta, equations.rows)[0][record.at]
+        outputs.append(output)
+        residuals.append(np.where(record.valid[record.at] > 0.0, record.measured - output, np.nan))
+        links.append(equations.links)
+    whitened = [residual / record.noise for residual, record in zip(residuals, records)]
+    white = whiteness(whitened, [r.noise_samples for r in records], [float(np.median(np.diff(r.time[r.at]))) for r in records])
+    cost = float(np.nanmean(np.concatenate([w.ravel() for w in whitened]) ** 2))
+    return Left(tuple(outputs), tuple(residuals), tuple(links), white, rms(layout, residuals), cost)
+
+
+def free_run(fitted: Fit, records: Sequence[Record]) -> Left:
+    """Simulation from the initial motion alone: nothing about this recording's sensors is fitted."""
+    layout = fitted.layout
+    theta = fitted.theta.copy()
+    theta[layout.common :] = 0.0
+    trajectories = []
+    for r, (record, trajectory) in enumerate(zip(records, fitted.trajectories)):
+        moved = motion_of(layout, record, r, theta, trajectory.a)
+        for _ in range(SIMULATION_STEPS):
+            last, equations = moved, linearise(layout, record, r, theta, moved)
+            moved = advance(layout, record, r, theta, np.zeros(layout.size), last, equations)
+            if np.abs(moved.a - last.a).max() < SIMULATED * np.abs(moved.a).max():
+                break
+        trajectories.append(moved)
+    return _left(layout, records, theta, trajectories)

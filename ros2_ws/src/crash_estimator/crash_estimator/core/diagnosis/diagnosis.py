@@ -1,0 +1,135 @@
+"""Which physical effect is missing: the answer, from a structure and one or more recordings of it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from crash_replay.recording import Recording
+
+from ..effects import EFFECTS
+from ..effects.base import Effect
+from ..structure import ModelError, Structure
+from .additions import additions_of, structure_with
+from .answer import Ranked, StepReport, ranking_of, step_of
+from .assess import free_run, noise_floor
+from .misfit import MisfitWindow, misfit_windows
+from .records import make_record
+from .scales import make_scales
+from .search import LEAST_SHARE, Model, Round, fit_model, search, share_removed
+
+CELLS = 36
+"""Of a free curve over its crush scale."""
+
+FINER_CELLS = 72
+NEAR_THE_FLOOR = 2.0
+"""Where the residual's mean square is within this factor of the noise's, a finer curve may be all that is missing."""
+
+
+@dataclass(frozen=True)
+class Rms:
+    """Root mean square of measured minus predicted over all outputs, m/s^2; None where it is not known."""
+
+    before: float
+    after: float
+    noise_floor: float | None = None
+    unit: str = "m/s^2"
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What was found; `as_json` is the contract of `diagnose --json`."""
+
+    verdict: str  # effect_missing, adequate or unexplained
+    text: str  # one readable line
+    residual_rms: Rms  # of the fit
+    free_run_rms: Rms  # of a simulation from the initial motion alone
+    ranking: tuple[Ranked, ...]  # of the first round, best first
+    steps: tuple[StepReport, ...]  # effects added, in order
+    remaining: tuple[Ranked, ...]  # what was left of the candidates in the last round
+    misfit: tuple[MisfitWindow, ...]  # of the structure as it was given
+    misfit_after: tuple[MisfitWindow, ...]
+    structure: Structure  # with the effects that were added
+    models: tuple[Model, ...]  # as given, then after each step
+
+    def as_json(self) -> dict:
+        return {
+            "verdict": self.verdict,
+            "text": self.text,
+            "residual_rms": vars(self.residual_rms),
+            "free_run_rms": {k: v for k, v in vars(self.free_run_rms).items() if v is not None},
+            "ranking": [ranked.as_json() for ranked in self.ranking],
+            "steps": [step.as_json() for step in self.steps],
+            "misfit": [window._asdict() for window in self.misfit],
+            "misfit_after": [window._asdict() for window in self.misfit_after],
+        }
+
+
+def diagnose(
+    structure: Structure, recordings: Sequence[Recording], effects: Mapping[str, Effect] = EFFECTS
+) -> Diagnosis:
+    """Compare a structure (with the effects that it has) with recordings of it, and name what is missing.
+
+    Raises ModelError or RecordingError, one line, where the data or the model is at fault.
+    """
+    if not recordings:
+        raise ModelError("a diagnosis needs at least one recording")
+    records = [make_record(structure, recording) for recording in recordings]
+    scales = make_scales(structure, records, CELLS)
+    present = additions_of(structure, scales, effects)
+    rounds, final = search(records, scales, effects, present)
+    if not final.left.whiteness.white and final.left.cost < NEAR_THE_FLOOR:
+        finer = make_scales(structure, records, FINER_CELLS)
+        refined = fit_model(structure, records, finer, final.additions)
+        if refined.left.whiteness.white or share_removed(final, refined) > LEAST_SHARE:
+            finer_rounds, finer_final = search(records, finer, effects, present)
+            if finer_final.left.whiteness.white:
+                rounds, final = finer_rounds, finer_final
+    return _answer(structure, rounds, final, len(present))
+
+
+def _answer(structure: Structure, rounds: list[Round], final: Model, present: int) -> Diagnosis:
+    first = rounds[0].before
+    models = (first, *(round_.before for round_ in rounds[1:]))
+    if models[-1] is not final:
+        models = (*models, final)
+    added = final.additions[present:]
+    runs = [free_run(model.fit, model.records).rms for model in models]
+    steps = tuple(step_of(*each) for each in zip(rounds, models, models[1:], zip(runs, runs[1:])))[: len(added)]
+    white = final.left.whiteness.white
+    verdict = ("effect_missing" if added else "adequate") if white else "unexplained"
+    floor = noise_floor(first.fit.layout, first.records)
+    ranking = ranking_of(rounds[0], len(first.records))
+    return Diagnosis(
+        verdict=verdict,
+        text=_text(verdict, steps, ranking, first, final, floor),
+        residual_rms=Rms(first.left.rms, final.left.rms, floor),
+        free_run_rms=Rms(runs[0], runs[-1]),
+        ranking=ranking,
+        steps=steps,
+        remaining=ranking_of(rounds[-1], len(first.records)),
+        misfit=misfit_windows(first.fit.layout, first.records, first.left),
+        misfit_after=misfit_windows(final.fit.layout, final.records, final.left),
+        structure=structure_with(structure, final, present),
+        models=models,
+    )
+
+
+def _text(verdict: str, steps, ranking, first: Model, final: Model, floor: float) -> str:
+    names = ", ".join(f"{step.effect} on {step.target}" for step in steps)
+    size = f"residual RMS {first.left.rms:.3g} -> {final.left.rms:.3g} m/s^2, noise floor {floor:.3g}"
+    if verdict == "adequate":
+        return f"adequate: nothing significant is missing (residual RMS {final.left.rms:.3g} m/s^2, noise floor {floor:.3g})"
+    if verdict == "effect_missing":
+        advice = ""
+        rivals = ranking[0].confounded_with if ranking else ()
+        if rivals:
+            advice = f"; this cannot be told from {', '.join(rivals)}"
+            advice += " on one recording: record another speed" if len(first.records) == 1 else " on these recordings"
+        return f"effect missing: {names}; {size}, now white{advice}"
+    worst = final.left.whiteness.worst
+    layout = final.fit.layout
+    where = (
+        f"{layout.outputs[worst.output].channel} of {final.records[worst.record].test.id}, "
+        f"{worst.low:.0f} to {worst.high:.0f} Hz"
+    )
+    done = f"{names} {'explains' if len(steps) == 1 else 'explain'} part of it; " if steps else ""
+    return f"unexplained: {done}{size}; no candidate explains what is left, most of it in {where}"

@@ -1,0 +1,319 @@
+"""Output-error fit: the free-run motion closest to all measured outputs, with its evidence.
+
+Trajectory and parameters are improved together (lifted Newton): the equations are linearised along a trajectory that
+need not satisfy them yet, and one linear solve corrects both. It starts from the measured motion, along which most
+forces are linear in their parameters, so that no good guess is needed. At first an observer pulls the
+simulation towards the measured motion and the noise is taken larger than it is; both fade out. When it has
+converged, the trajectory is the free-run simulation with the fitted parameters.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, solve_triangular
+
+from .layout import Layout
+from .linearise import Equations, linearise, measured_motion, motion_of, predicted
+from .propagate import FREE, propagate
+from .records import Record
+from .trajectory import Trajectory
+
+NO_TRACE = np.zeros((0, 0))
+
+
+class Stage(NamedTuple):
+    pull: float  # 1/s, observer
+    inflate: float  # factor on the noise
+    blur: float  # steps of time in which contact opens and closes
+
+
+FADE = (Stage(200.0, 30.0, 16.0), Stage(80.0, 10.0, 8.0), Stage(30.0, 3.0, 4.0), Stage(0.0, 1.0, 2.0))
+"""Stages of a fit that starts from the measured motion; then the observer is off and the noise as it is.
+
+A force that jumps at separation is felt by the fit only while it jumps: blurred, it is drawn to the right instant."""
+
+REFINE = (Stage(0.0, 2.0, 6.0), Stage(0.0, 1.0, 2.0))
+"""Stages of a fit that starts from a simulation."""
+
+SLOWLY = tuple(Stage(0.0, 1.0, blur) for blur in (8.0, 8.0, 8.0, 4.0, 4.0, 4.0, 2.0, 2.0, 2.0))
+"""Stages where a force that jumps at separation has stopped a fit short."""
+
+FREE_RUN = Stage(0.0, 1.0, 1.0)
+
+MOST_ITERATIONS = 20
+LEAST = 6
+MOST_HALVINGS = 5
+LONGEST_SHAPE_STEP = 0.35
+"""Of the logarithm of a shape constant in one iteration."""
+
+CONVERGED = 0.1
+"""Change of the cost below which an iteration was the last ..."""
+
+COARSE = 1e-3
+"""... or as a share of what the cost exceeds that of a fit at the noise floor by: a misfit needs no precision."""
+
+
+RIDGE = 1e-8
+"""Share of a parameter's own precision."""
+
+
+class Normal(NamedTuple):
+    """Whitened residual and its derivative at one parameter vector, summed up: cost(d) = c - 2 b d + d A d."""
+
+    matrix: np.ndarray  # (p, p)
+    vector: np.ndarray  # (p,)
+    cost: float  # sum of squares of the whitened residual
+    samples: int
+
+
+class Step(NamedTuple):
+    delta: np.ndarray
+    before: float  # cost with the prior
+    after: float  # expected
+    factor: tuple
+    free: np.ndarray
+    scale: np.ndarray
+
+
+class Fit(NamedTuple):
+    """A fitted model."""
+
+    layout: Layout
+    theta: np.ndarray  # (p,)
+    covariance: np.ndarray  # (p, p)
+    trajectories: tuple[Trajectory, ...]
+    cost: float  # 2 x negative logarithm of the posterior at its maximum, less constants common to all models
+    evidence: float  # nats: logarithm of the marginal likelihood, less constants common to all models
+    iterations: int
+
+
+def normal_equations(
+    layout: Layout, records: Sequence[Record], theta, trajectories, follow: bool = True, switched=(), stage: Stage = FREE_RUN
+) -> tuple[Normal, list[Equations]]:
+    """follow=False leaves out that the motion changes with the forces: the equation error on the given motion."""
+    size = layout.size + len(switched)
+    matrix, vector = np.zeros((size, size)), np.zeros(size)
+    cost, samples, every = 0.0, 0, []
+    for r, (record, trajectory) in enumerate(zip(records, trajectories)):
+        target = measured_motion(layout, record, r, theta) if stage.pull else None
+        equations = linearise(layout, record, r, theta, trajectory, switched, stage.pull, target, stage.blur)
+        if not follow:
+            still = np.zeros_like(equations.linear.kx)
+            equations = equations._replace(linear=equations.linear._replace(kx=still, kv=still, kp=still))
+        residual, jacobian = _outputs(layout, record, r, theta, trajectory, equations, target)
+        flat = jacobian.reshape(-1, jacobian.shape[-1])
+        c = equations.columns
+        matrix[np.ix_(c, c)] += flat.T @ flat
+        vector[c] += flat.T @ residual.ravel()
+        cost += float(residual.ravel() @ residual.ravel())
+        samples += residual.size
+        every.append(equations)
+    return Normal(matrix, vector, cost, samples), every
+
+
+def _outputs(layout, record, r, theta, trajectory, equations, target) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened binned residual (bins, q) corrected for the defect, and its derivative (bins, q, columns)."""
+    out = np.zeros((record.bins, len(layout.outputs), 1 + len(equations.columns)))
+    propagate(equations.linear, layout.knots, equations.sampling, out, NO_TRACE)
+    # what acts on outputs only is linearised at the forces' prediction: the measured motion itself is noisy
+    by = predicted(layout, record, r, theta, equations.rows)[1]
+    weight = equations.sampling.weight
+    position = {int(p): j + 1 for j, p in enumerate(equations.columns)}
+    for q, parameter, column in by:
+        out[:, q, position[parameter]] += _binned(record, weight[:, q] * column)
+    # along the trajectory: the free bodies' own acceleration less the observer's; fixed forces are in column 0
+    along = np.where(layout.kind == FREE, trajectory.a, 0.0)
+    if target is not None:
+        pull = equations.linear.pull
+        push = pull**2 * (trajectory.x - target.x) + 2.0 * pull * (trajectory.v - target.v)
+        along += np.where(layout.kind == FREE, push, 0.0)
+    misfit = np.zeros((len(record.time), len(layout.outputs)))
+    misfit[record.at] = np.nan_to_num(record.measured - predicted(layout, record, r, theta, along)[0][record.at])
+    residual = np.stack([_binned(record, weight[:, q] * misfit[:, q]) for q in range(len(layout.outputs))], axis=1)
+    residual, jacobian = residual - out[:, :, 0], out[:, :, 1:]
+    if record.mix is not None:
+        residual, jacobian = residual @ record.mix.T, record.mix @ jacobian
+    return residual, jacobian
+
+
+def _binned(record: Record, values: np.ndarray) -> np.ndarray:
+    return np.bincount(record.bin[record.at], weights=values[record.at], minlength=record.bins)
+
+
+def solve(layout: Layout, normal: Normal, theta: np.ndarray, inflate: float = 1.0, held: np.ndarray | None = None) -> Step:
+    """Minimum of the quadratic model with the prior, inside the limits (an active set).
+
+    inflate: factor on the noise; held (p,): parameters that stay. Raises LinAlgError where nothing is finite.
+    """
+    prior, weight = layout.prior, 1.0 / inflate**2
+    matrix = weight * normal.matrix + prior.precision
+    if not np.isfinite(matrix).all():
+        raise LinAlgError("the simulation diverged")
+    off = theta - prior.mean
+    vector = weight * normal.vector - prior.precision @ off
+    before = weight * normal.cost + float(off @ prior.precision @ off)
+    scale = 1.0 / np.sqrt(np.diagonal(matrix))
+    low, high = prior.low - theta, prior.high - theta
+    held = np.zeros(layout.size, bool) if held is None else held.copy()
+    delta = np.zeros(layout.size)
+    for _ in range(8):
+        free = ~held
+        target = vector - matrix[:, held] @ delta[held]
+        small = matrix[np.ix_(free, free)] * np.outer(scale[free], scale[free])
+        factor = _cholesky(small)
+        delta[free] = scale[free] * cho_solve(factor, scale[free] * target[free], check_finite=False)
+        outside = free & ((delta < low - 1e-12 * np.abs(low)) | (delta > high + 1e-12 * np.abs(high)))
+        if not outside.any():
+            break
+        delta[outside] = np.clip(delta[outside], low[outside], high[outside])
+        held |= outside
+    after = before - 2.0 * float(vector @ delta) + float(delta @ matrix @ delta)
+    return Step(delta, before, after, factor, free, scale)
+
+
+def _cholesky(matrix: np.ndarray) -> tuple[np.ndarray, bool]:
+    """Factor of a matrix with a unit diagonal; two columns that say the same may round to less than positive."""
+    try:
+        return cho_factor(matrix, lower=True, check_finite=False)
+    except LinAlgError:
+        return cho_factor(matrix + RIDGE * np.eye(len(matrix)), lower=True, check_finite=False)
+
+
+def advance(
+    layout: Layout, record: Record, r: int, theta, delta, trajectory: Trajectory, equations: Equations
+) -> Trajectory:
+    """The trajectory of theta + delta, to first order."""
+    linear = equations.linear
+    change = delta[equations.columns]
+    extra = linear.extra[:, :, :1] + (linear.extra[:, :, 1:] @ change[layout.knots :])[:, :, None]
+    knots = np.concatenate([[0.0], delta[: layout.knots]])
+    push = (linear.weight * np.where(linear.knot >= 0, knots[linear.knot], 0.0)).sum(axis=2)  # (g, l)
+    for i, (a, c) in enumerate(linear.ends):
+        extra[:, a, 0] -= push[:, i] * linear.inverse_mass[a]
+        extra[:, c, 0] += push[:, i] * linear.inverse_mass[c]
+    single = linear._replace(extra=extra, knot=np.full_like(linear.knot, -1))
+    trace = np.zeros((len(record.time), len(layout.bodies)))
+    propagate(single, 0, equations.sampling, np.zeros((record.bins, len(layout.outputs), 1)), trace)
+    return motion_of(layout, record, r, theta + delta, trajectory.a + trace)
+
+
+def equation_error_start(layout: Layout, records: Sequence[Record]) -> tuple[np.ndarray, list[Trajectory]]:
+    """Parameters that fit the forces along the measured motion, and that motion."""
+    theta = layout.start.copy()
+    trajectories = [measured_motion(layout, record, r, theta) for r, record in enumerate(records)]
+    normal, _ = normal_equations(layout, records, theta, trajectories, follow=False)
+    held = shape_parameters(layout)
+    held[layout.common :] = True
+    return theta + solve(layout, normal, theta, FADE[0].inflate, held).delta, trajectories
+
+
+def shape_parameters(layout: Layout) -> np.ndarray:
+    """(p,) True for the logarithms of shape constants."""
+    found = np.zeros(layout.size, bool)
+    for place in layout.places:
+        found[list(place.shapes.values())] = True
+    return found
+
+
+class _Point(NamedTuple):
+    theta: np.ndarray
+    trajectories: list[Trajectory]
+
+
+def fit(
+    layout: Layout, records: Sequence[Record], start: tuple[np.ndarray, Sequence[Trajectory]] | None = None,
+    hopeless: float = np.inf, most: int = MOST_ITERATIONS, refine: Sequence[Stage] = (),
+) -> Fit:  # fmt: skip
+    """Fit from the measured motion, or from given parameters and trajectories.
+
+    hopeless: cost above which, after LEAST iterations, it is not worth going on; refine: stages before the free run
+    of a fit that is given its start.
+    """
+    stages = list(refine) if start else list(FADE)
+    point = _Point(*(start or equation_error_start(layout, records)))
+    shapes = shape_parameters(layout)
+    kept: tuple[_Point, Step] | None = None
+    least: tuple[_Point, Step, Normal] | None = None
+    halvings, last, iteration = 0, np.inf, 0
+    while True:
+        iteration += 1
+        stage = stages.pop(0) if stages else FREE_RUN
+        try:
+            normal, equations = normal_equations(layout, records, *point, stage=stage)
+            step = solve(layout, normal, point.theta, stage.inflate, shapes if stage.inflate > 1.0 else None)
+        except LinAlgError:
+            step = None
+        worse = step is None or (kept is not None and step.before > kept[1].before + 1.0)
+        if worse and kept is not None and halvings < MOST_HALVINGS:
+            halvings += 1
+            point = _between(layout, records, kept[0], point)
+            continue
+        if step is None:
+            return _failed(layout, point, iteration)
+        kept = (point, step) if stage == FREE_RUN else None
+        halvings = 0
+        if stage == FREE_RUN and (least is None or step.before < least[1].before):
+            least = point, step, normal
+        delta = step.delta * _shorten(step.delta, shapes)
+        moved = [
+            advance(layout, record, r, point.theta, delta, trajectory, eq)
+            for r, (record, trajectory, eq) in enumerate(zip(records, point.trajectories, equations))
+        ]
+        point = _Point(point.theta + delta, moved)
+        change, last = abs(last - step.after) if stage == FREE_RUN else np.inf, step.after
+        enough = max(CONVERGED, COARSE * (step.after - 1.3 * normal.samples))
+        if stage == FREE_RUN and (change < enough or (iteration >= LEAST and step.after - change > hopeless)):
+            break
+        if iteration >= most:
+            break
+    cost = step.after
+    if least is not None and cost > least[1].before:  # it went astray at a kink of the forces
+        (point, _, normal), cost = least, least[1].before
+    try:
+        covariance, log_determinant = _posterior(normal.matrix + layout.prior.precision)
+    except LinAlgError:
+        return _failed(layout, point, iteration)
+    evidence = -0.5 * cost - 0.5 * log_determinant + 0.5 * log_prior(layout)
+    return Fit(layout, point.theta, covariance, tuple(point.trajectories), cost, evidence, iteration)
+
+
+def _failed(layout: Layout, point: _Point, iteration: int) -> Fit:
+    """A simulation that diverges, whatever is tried: infinitely unlikely."""
+    unknown = np.full_like(layout.prior.precision, np.nan)
+    return Fit(layout, point.theta, unknown, tuple(point.trajectories), np.inf, -np.inf, iteration)
+
+
+def _shorten(delta: np.ndarray, shapes: np.ndarray) -> float:
+    longest = float(np.abs(delta[shapes]).max(initial=0.0))
+    return min(1.0, LONGEST_SHAPE_STEP / longest) if longest > 0.0 else 1.0
+
+
+def _between(layout: Layout, records: Sequence[Record], good: _Point, bad: _Point) -> _Point:
+    """Half way back."""
+    theta = good.theta + 0.5 * (bad.theta - good.theta)
+    moved = []
+    for r, (record, old, new) in enumerate(zip(records, good.trajectories, bad.trajectories)):
+        a = np.where(np.isfinite(new.a), 0.5 * (old.a + new.a), old.a)
+        moved.append(motion_of(layout, record, r, theta, a))
+    return _Point(theta, moved)
+
+
+def _posterior(matrix: np.ndarray) -> tuple[np.ndarray, float]:
+    """Covariance (p, p) and the logarithm of the precision's determinant.
+
+    A parameter held at its limit counts like any other: it was free to be elsewhere.
+    """
+    scale = 1.0 / np.sqrt(np.diagonal(matrix))
+    factor = _cholesky(matrix * np.outer(scale, scale))[0]
+    inner = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
+    log_determinant = 2.0 * float(np.log(np.diagonal(factor)).sum() - np.log(scale).sum())
+    return (inner.T @ inner) * np.outer(scale, scale), log_determinant
+
+
+def log_prior(layout: Layout) -> float:
+    """Logarithm of the determinant of the prior's precision, and what limits add: half a normal is twice as dense."""
+    prior = layout.prior
+    scale = 1.0 / np.sqrt(np.diagonal(prior.precision))
+    value = float(np.linalg.slogdet(prior.precision * np.outer(scale, scale))[1] - 2.0 * np.log(scale).sum())
+    return value + 2.0 * np.log(2.0) * np.count_nonzero((prior.low == 0.0) & (prior.mean == 0.0))

@@ -1,0 +1,305 @@
+"""The equations of motion along a trajectory: what they miss (defect), and how they change with motion and parameters."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import savgol_coeffs
+
+from ..effects.base import AttachedBody, BodyForce, BodyInertia, ChannelError
+from .layout import DRIVEN_MODES, Layout, Link, Place
+from .linkforce import LinkForce, link_force
+from .propagate import DRIVEN, FIXED, FREE, Linear, Sampling
+from .records import Record
+from .scales import attached_start
+from .trajectory import Trajectory, integrate, measured_crush
+
+
+class Equations(NamedTuple):
+    """One record's equations at a trajectory."""
+
+    linear: Linear
+    sampling: Sampling
+    rows: np.ndarray  # (g, b) acceleration of free and driven bodies, force on fixed ones, as the forces give them
+    columns: np.ndarray  # parameter of each column after the first, (columns - 1,)
+    links: list[LinkForce]
+
+
+class Distortion(NamedTuple):
+    """A channel's error: recorded(t) = (1 + gain) true(t - delay) + offset, and its parameters (-1: none)."""
+
+    gain: float = 0.0
+    delay: float = 0.0
+    offset: float = 0.0
+    parameters: tuple[int, int, int] = (-1, -1, -1)
+
+
+def distortion(layout: Layout, theta: np.ndarray, channel: str) -> Distortion:
+    found, parameters = {"gain": 0.0, "delay": 0.0, "offset": 0.0}, {"gain": -1, "delay": -1, "offset": -1}
+    for place in layout.places:
+        if isinstance(place.addition.effect, ChannelError) and place.addition.target == channel:
+            found[place.addition.effect.role] = float(theta[place.coefficient])
+            parameters[place.addition.effect.role] = place.coefficient
+    found["delay"] = max(found["delay"], 0.0)  # at its limit it may be a rounding error below
+    return Distortion(**found, parameters=tuple(parameters.values()))
+
+
+def driven_motion(layout: Layout, record: Record, r: int, theta: np.ndarray):
+    """Acceleration (g, b) of the driven bodies, and its derivatives: a list of (body, parameter, (g,))."""
+    structure = layout.structure
+    g = len(record.time)
+    a, by = np.zeros((g, len(layout.bodies))), []
+    channels = {k: body.acceleration for k, body in enumerate(structure.bodies) if body.driven}
+    channels |= {k: (channel,) for channel, k in layout.attached.items()}
+    end = record.time[-1]
+    cosines = np.cos(np.outer(np.pi * record.time / end, np.arange(DRIVEN_MODES + 1)))
+    for k, names in channels.items():
+        for name in names:
+            d, signal = distortion(layout, theta, name), record.signals[name]
+            share = 1.0 / len(names)
+            after = record.time + d.delay
+            true = (np.interp(after, signal.time, signal.values) - d.offset) / (1.0 + d.gain)
+            a[:, k] += share * true
+            gain, delay, offset = d.parameters
+            if gain >= 0:
+                by.append((k, gain, -share * true / (1.0 + d.gain)))
+            if offset >= 0:
+                by.append((k, offset, np.full(g, -share / (1.0 + d.gain))))
+            if delay >= 0:
+                step = 0.5 * float(np.median(record.dt[1:]))
+                up, down = (np.interp(after + s * step, signal.time, signal.values) for s in (1.0, -1.0))
+                by.append((k, delay, share * (up - down) / (2.0 * step) / (1.0 + d.gain)))
+        first = layout.modes[r][k]
+        a[:, k] += cosines @ theta[first : first + DRIVEN_MODES + 1]
+        by += [(k, first + j, cosines[:, j]) for j in range(DRIVEN_MODES + 1)]
+    return a, by
+
+
+def start_values(layout: Layout, record: Record) -> tuple[np.ndarray, np.ndarray]:
+    """(b,) initial velocities and displacements, attached bodies included."""
+    v0, x0 = list(record.initial_velocity), list(record.initial_displacement)
+    by_channel = {p.addition.target: p.addition for p in layout.places if isinstance(p.addition.effect, AttachedBody)}
+    for channel in layout.attached:
+        x, v = attached_start(layout.structure, record, by_channel[channel])
+        v0.append(v)
+        x0.append(x)
+    return np.array(v0), np.array(x0)
+
+
+def linearise(
+    layout: Layout, record: Record, r: int, theta: np.ndarray, trajectory: Trajectory, switched: Sequence[Link] = (),
+    pull: float = 0.0, target: Trajectory | None = None, blur: float = 1.0,
+) -> Equations:  # fmt: skip
+    """Forces and derivatives along a trajectory whose driven bodies already move as theta says.
+
+    switched: other laws for links of the layout, by name; each gives one more column, numbered from layout.size
+    on, the change of force when that law takes the place of the present one. pull (1/s): of an observer
+    towards the motion `target`; blur: steps of time in which contact opens and closes.
+    """
+    g, bodies = trajectory.a.shape
+    mass, extra_mass = _masses(layout, theta)
+    inverse = np.array([1.0 / m if k == FREE else 1.0 if _measured(layout, b) else 0.0 for b, (k, m) in enumerate(zip(layout.kind, mass))])
+    inverse[layout.kind == DRIVEN] = 0.0
+    external: dict[int, np.ndarray] = {}
+
+    def external_for(parameter: int) -> np.ndarray:
+        if parameter not in external:
+            external[parameter] = np.zeros((g, bodies))
+        return external[parameter]
+
+    loads = np.zeros((g, bodies))
+    n = len(layout.links)
+    kx, kv, kp = np.zeros((g, n)), np.zeros((g, n)), np.zeros((g, n))
+    loading, knot, weight = np.zeros((g, n), bool), np.full((g, n, 2), -1, np.int64), np.zeros((g, n, 2))
+    forces = []
+    for i, link in enumerate(layout.links):
+        crush, rate = _motion(link, record, r, trajectory)
+        found = link_force(link, theta, record.time, blur * _steps(record), crush, rate)
+        a, c = link.ends
+        loads[:, a] -= found.force
+        loads[:, c] += found.force
+        kx[:, i], kv[:, i], kp[:, i], loading[:, i] = found.kx, found.kv, found.kp, found.loading
+        knot[:, i], weight[:, i] = np.where(found.knot >= 0, found.knot + 1, -1), found.weight
+        for parameter, column in zip(found.parameters, found.columns):
+            into = external_for(parameter)
+            into[:, a] -= column * inverse[a]
+            into[:, c] += column * inverse[c]
+        forces.append(found)
+    numbers = {link.name: i for i, link in enumerate(layout.links)}
+    for j, link in enumerate(switched):
+        present, (a, c) = forces[numbers[link.name]], link.ends
+        crush, rate = _motion(link, record, r, trajectory)
+        change = link_force(link, np.append(theta, link.trial), record.time, blur * _steps(record), crush, rate).force - present.force
+        into = external_for(layout.size + j)
+        into[:, a] -= change * inverse[a]
+        into[:, c] += change * inverse[c]
+    for place in layout.places:
+        _body_effect(layout, record, place, theta, trajectory, loads, external_for, inverse)
+    rows = loads * inverse
+    driven = layout.kind == DRIVEN
+    rows[:, driven] = trajectory.a[:, driven]
+    for place in layout.places:
+        addition = place.addition
+        inertia = addition.target if isinstance(addition.effect, BodyInertia) else None
+        if inertia is not None:
+            k = layout.structure.body_index[inertia]
+            external_for(place.coefficient)[:, k] -= rows[:, k] * inverse[k]
+        if isinstance(addition.effect, AttachedBody) and addition.taken_from:
+            k = layout.structure.body_index[addition.taken_from]
+            external_for(place.coefficient)[:, k] += rows[:, k] * inverse[k]
+    for k, parameter, column in driven_motion(layout, record, r, theta)[1]:
+        external_for(parameter)[:, k] += column
+    sampling, outputs = _sampling(layout, record, theta)
+    for parameter in outputs:
+        external_for(parameter)
+    for q in range(len(layout.outputs)):
+        external_for(layout.offsets[r] + q)
+    extra = np.zeros((g, bodies, 1 + len(external)))
+    free = layout.kind == FREE
+    extra[:, free, 0] = rows[:, free] - trajectory.a[:, free]
+    if pull:
+        x, v = trajectory.x - target.x, trajectory.v - target.v
+        extra[:, free, 0] -= pull**2 * x[:, free] + 2.0 * pull * v[:, free]
+    fixed = layout.kind == FIXED
+    extra[:, fixed, 0] = rows[:, fixed]
+    for j, column in enumerate(external.values()):
+        extra[:, :, j + 1] = column
+    ends = np.array([link.ends for link in layout.links]).reshape(-1, 2)
+    crush_ends = np.array([link.crush_ends for link in layout.links]).reshape(-1, 2)
+    linear = Linear(record.dt, ends, crush_ends, inverse, layout.kind, kx, kv, kp, loading, knot, weight, pull, extra)
+    every = np.concatenate([np.arange(layout.knots), np.array(list(external), dtype=int)])
+    return Equations(linear, sampling, rows, every, forces)
+
+
+def _steps(record: Record) -> np.ndarray:
+    """(g,) length of the step that an instant stands for."""
+    return np.maximum(record.dt, record.dt[1] if len(record.dt) > 1 else 1e-4)
+
+
+def _measured(layout: Layout, body: int) -> bool:
+    return any(output.body == body and output.fixed for output in layout.outputs)
+
+
+def _masses(layout: Layout, theta: np.ndarray) -> tuple[np.ndarray, None]:
+    mass = np.array([body.mass or 1.0 for body in layout.structure.bodies] + [1.0] * len(layout.attached))
+    for place in layout.places:
+        addition = place.addition
+        if isinstance(addition.effect, BodyInertia):
+            mass[layout.structure.body_index[addition.target]] += theta[place.coefficient]
+        if isinstance(addition.effect, AttachedBody) and addition.taken_from:
+            mass[layout.structure.body_index[addition.taken_from]] -= theta[place.coefficient]
+    return mass, None
+
+
+def _motion(link, record: Record, r: int, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    if link.displacement:
+        return measured_crush(record, link.displacement, link.velocity)
+    a, b = link.crush_ends
+    origin = link.origin[r] if link.origin else 0.0
+    return trajectory.x[:, a] - trajectory.x[:, b] - origin, trajectory.v[:, a] - trajectory.v[:, b]
+
+
+def _body_effect(layout, record, place: Place, theta, trajectory, loads, external_for, inverse) -> None:
+    """Forces that act on one body: constant ones, and an attached body's inertia."""
+    addition, c = place.addition, float(theta[place.coefficient])
+    if isinstance(addition.effect, BodyForce):
+        k, force = layout.structure.body_index[addition.target], addition.effect.force(record.time)
+    elif isinstance(addition.effect, AttachedBody):
+        k, force = layout.structure.body_index[addition.host], -_smooth(trajectory.a[:, layout.attached[addition.target]])
+    else:
+        return
+    loads[:, k] += c * force
+    external_for(place.coefficient)[:, k] += force * inverse[k]
+
+
+SMOOTH = savgol_coeffs(11, 2)
+"""A measured inertia acts with its sensor's noise: a short local parabola takes most of that out, and leaves the signal."""
+
+
+def _smooth(a: np.ndarray) -> np.ndarray:
+    half = len(SMOOTH) // 2
+    padded = np.concatenate([np.full(half, a[0]), a, np.full(half, a[-1])])
+    return np.convolve(padded, SMOOTH, "valid")
+
+
+def _sampling(layout: Layout, record: Record, theta: np.ndarray) -> tuple[Sampling, list[int]]:
+    """How rows become outputs, and the parameters that act on outputs only."""
+    step = float(np.median(record.dt[1:]))
+    found = [distortion(layout, theta, output.channel) for output in layout.outputs]
+    lag = np.array([d.delay / step for d in found])
+    parameters = [p for d in found for p in d.parameters if p >= 0]
+    sampling = Sampling(
+        body=np.array([output.body for output in layout.outputs]),
+        gain=np.array([1.0 + d.gain for d in found]),
+        lag=np.floor(lag).astype(int),
+        fraction=lag - np.floor(lag),
+        bin=record.bin,
+        weight=record.valid / record.noise,
+    )
+    return sampling, parameters
+
+
+def predicted(layout: Layout, record: Record, r: int, theta: np.ndarray, rows: np.ndarray):
+    """(g, q) outputs that rows (g, b) give, and the columns of what acts on outputs only: (q, parameter, (g,))."""
+    outputs, by = np.zeros((len(record.time), len(layout.outputs))), []
+    step = float(np.median(record.dt[1:]))
+    for q, output in enumerate(layout.outputs):
+        d = distortion(layout, theta, output.channel)
+        lag = d.delay / step
+        whole, fraction = int(np.floor(lag)), lag - np.floor(lag)
+        true = (1.0 - fraction) * _later(rows[:, output.body], whole)
+        if fraction:
+            true += fraction * _later(rows[:, output.body], whole + 1)
+        offset = layout.offsets[r] + q
+        outputs[:, q] = (1.0 + d.gain) * true + d.offset + theta[offset]
+        by.append((q, offset, np.ones(len(true))))
+        gain, delay, jump = d.parameters
+        if gain >= 0:
+            by.append((q, gain, true))
+        if jump >= 0:
+            by.append((q, jump, np.ones(len(true))))
+        if delay >= 0:
+            slope = (_later(rows[:, output.body], whole + 1) - _later(rows[:, output.body], whole)) / step
+            by.append((q, delay, (1.0 + d.gain) * slope))
+    return outputs, by
+
+
+def _later(values: np.ndarray, steps: int) -> np.ndarray:
+    return values if not steps else np.concatenate([np.zeros(steps), values[: len(values) - steps]])
+
+
+def balance_of(layout: Layout, record: Record, theta: np.ndarray) -> np.ndarray:
+    """(g,) N: the force on a fixed body that the measured accelerations of all masses call for, - sum of M a."""
+    motion = measured_motion(layout, record, 0, np.where(np.arange(layout.size) < layout.common, theta, 0.0))
+    mass, _ = _masses(layout, theta)
+    force = np.zeros(len(record.time))
+    for k, body in enumerate(layout.structure.bodies):
+        if body.free:
+            force -= mass[k] * motion.a[:, k]
+    for place in layout.places:
+        if isinstance(place.addition.effect, AttachedBody):
+            force -= theta[place.coefficient] * motion.a[:, layout.attached[place.addition.target]]
+        if isinstance(place.addition.effect, BodyForce):
+            force += theta[place.coefficient] * place.addition.effect.force(record.time)
+    return force
+
+
+def measured_motion(layout: Layout, record: Record, r: int, theta: np.ndarray) -> Trajectory:
+    """What the sensors say of the motion, if they err as theta says."""
+    a = np.zeros((len(record.time), len(layout.bodies)))
+    for k, body in enumerate(layout.structure.bodies):
+        for name in body.acceleration if body.free else ():
+            d, signal = distortion(layout, theta, name), record.signals[name]
+            recorded = np.interp(record.time + d.delay, signal.time, signal.values)
+            a[:, k] += (recorded - d.offset) / (1.0 + d.gain) / len(body.acceleration)
+    return motion_of(layout, record, r, theta, a)
+
+
+def motion_of(layout: Layout, record: Record, r: int, theta: np.ndarray, free: np.ndarray) -> Trajectory:
+    """The trajectory in which free bodies accelerate as given (g, bodies) and driven ones as theta says."""
+    a = driven_motion(layout, record, r, theta)[0]
+    for k in np.flatnonzero(layout.kind == FREE):
+        a[:, k] = free[:, k]
+    v0, x0 = start_values(layout, record)
+    v, x = integrate(record.dt, a, v0, x0)
+    return Trajectory(a, v, x)

@@ -1,0 +1,171 @@
+"""One link's force along a motion, its slopes, and its derivative by every parameter that it has.
+
+    S  = curve, constant or known stiffness at the crush X (less the gap); on an unloading line
+         S(X_peak) - Ku (X_peak - X)
+    F  = S (1 + c h(V)) + gate (C V + sum of c_i f_i)
+
+`gate` is 1 where the link carries and 0 where it is apart; it turns within one time step, in proportion to the time
+carried, so that a force that jumps at contact gives the right momentum whatever the step.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..effects.base import ElementMotion
+from .curves import value
+from .layout import Link, Place
+
+SMALL_CRUSH = 1e-6
+SMALL_RATE = 1e-4
+
+
+class LinkForce(NamedTuple):
+    """g instants, m parameters."""
+
+    force: np.ndarray  # (g,) N
+    kx: np.ndarray  # (g,) dF/dX
+    kv: np.ndarray  # (g,) dF/dV
+    kp: np.ndarray  # (g,) dF/dX_peak
+    loading: np.ndarray  # (g,) bool
+    knot: np.ndarray  # (g, 2) parameters of the knots in use, -1: none
+    weight: np.ndarray  # (g, 2)
+    parameters: list[int]  # the m others
+    columns: list[np.ndarray]  # m of (g,), dF/dparameter
+    apart: np.ndarray  # (g,) bool
+    unloads: np.ndarray  # (g,) bool
+
+
+def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate: np.ndarray) -> LinkForce:
+    """Force of a link over crush (g,) m and rate (g,) m/s."""
+    parameters: list[int] = []
+    columns: list[np.ndarray] = []
+    gap = theta[link.gap] if link.gap is not None else 0.0
+    x = crush - gap
+    peak = np.maximum(np.maximum.accumulate(x), 0.0)
+    loading = x >= peak
+    slope = theta[link.slope] if link.slope is not None else link.unloading
+    on_line = ~loading & (slope is not None)
+    at = np.where(on_line, peak, x)
+    if link.curve is not None:
+        curve = value(link.curve, theta, at)
+        static, stiffness, knot, weight = curve.force, curve.slope, curve.column, curve.weight
+    else:
+        k = theta[link.constant] if link.constant is not None else link.known_stiffness
+        static, stiffness = k * at, np.full_like(at, k)
+        knot, weight = np.full((len(x), 2), -1), np.zeros((len(x), 2))
+    kx, kp = np.where(on_line, 0.0, stiffness), np.where(on_line, stiffness, 0.0)
+    if slope is not None:
+        static = static - np.where(on_line, slope * (peak - x), 0.0)
+        kx, kp = np.where(on_line, slope, kx), np.where(on_line, kp - slope, kp)
+    gate, gate_slope, open_ = _gate(link, x, rate, dt, static, on_line, slope)
+    spring_weight, spring_kp = weight, kp
+    static, kx, kp = static * open_, kx * open_, kp * open_
+    weight = weight * open_[:, None]
+    if link.curve is None and link.constant is not None:
+        parameters.append(link.constant)
+        columns.append(at * open_)
+    if link.slope is not None:
+        parameters.append(link.slope)
+        columns.append(np.where(on_line, x - peak, 0.0) * open_)
+
+    factor, kv = np.ones_like(x), np.zeros_like(x)
+    for place in link.factors:
+        c, h, dh = _factor(place, theta, rate, dt)
+        factor = factor + c * h[0]
+        kv = kv + static * c * dh
+        parameters += [place.coefficient, *place.shapes.values()]
+        columns += [static * h[0], *(static * c * d for d in h[1:])]
+    force, kx, kp, weight = static * factor, kx * factor, kp * factor, weight * factor[:, None]
+    columns = [column * factor if p in (link.constant, link.slope) else column for p, column in zip(parameters, columns)]
+
+    parallel, px, pv = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
+    damping = theta[link.damping] if link.damping is not None else link.known_damping
+    if damping or link.damping is not None:
+        parallel, pv = parallel + damping * rate, pv + damping
+        if link.damping is not None:
+            parameters.append(link.damping)
+            columns.append(gate * rate)
+    if link.forces:
+        motion = ElementMotion(time, x, rate, peak, static)
+        for place in link.forces:
+            c = theta[place.coefficient]
+            f, fx, fv, by_shape = _force(place, theta, motion, dt)
+            parallel, px, pv = parallel + c * f, px + c * fx, pv + c * fv
+            parameters += [place.coefficient, *place.shapes.values()]
+            columns += [gate * f, *(gate * c * d for d in by_shape)]
+    force = force + gate * parallel
+    kx, kv = kx + gate * px + gate_slope * parallel, kv + gate * pv
+    if slope is not None:
+        # on the unloading line it is the spring's force that opens the contact: what changes it, moves the instant
+        opens = np.where(on_line, gate_slope * parallel / max(slope, 1.0), 0.0)
+        weight, kp = weight + opens[:, None] * spring_weight, kp + opens * spring_kp
+        columns = [c + opens * at if p == link.constant else c for p, c in zip(parameters, columns)]
+    if link.gap is not None:
+        parameters.append(link.gap)
+        columns.append(-np.where(on_line, kx + kp, kx))
+    return LinkForce(force, kx, kv, kp, loading, knot, weight, parameters, columns, open_ == 0.0, on_line if slope is not None else rate < 0.0)
+
+
+def _gate(link: Link, x, rate, dt, static, on_line, slope):
+    """(gate, its slope by crush, whether the spring carries) over g instants."""
+    if link.tension and link.gap is None:
+        one = np.ones_like(x)
+        return one, np.zeros_like(x), one
+    carries = x > 0.0
+    margin = x
+    if slope is not None:
+        spent = on_line & (static <= 0.0)
+        carries = carries & ~spent
+        margin = np.where(on_line, np.minimum(x, static / max(slope, 1.0)), x)
+    width = np.maximum(np.abs(rate) * dt, 1e-9)
+    ramp = margin / width + 0.5
+    gate = np.clip(ramp, 0.0, 1.0)
+    if x[0] >= 0.0 and rate[0] > 0.0:
+        gate[0] = 1.0  # touching at time zero: it carries from then on
+    return gate, np.where((ramp > 0.0) & (ramp < 1.0), 1.0 / width, 0.0), carries.astype(float)
+
+
+def _shapes(place: Place, theta: np.ndarray, changed: str = "", by: float = 0.0) -> dict[str, float]:
+    return {name: float(np.exp(theta[p] + (by if name == changed else 0.0))) for name, p in place.shapes.items()}
+
+
+LOG_STEP = 1e-4
+
+
+def _force(place: Place, theta, motion: ElementMotion, dt):
+    """f, its slopes by crush and rate, and its derivatives by the logarithm of each shape constant."""
+    effect, shapes = place.addition.effect, _shapes(place, theta)
+    f = effect.force(motion, **shapes)
+
+    def shifted(sign):
+        crush = motion.crush + sign * SMALL_CRUSH
+        return effect.force(motion._replace(crush=crush), **shapes)
+
+    def faster(sign):
+        return effect.force(motion._replace(rate=motion.rate + sign * SMALL_RATE), **shapes)
+
+    fx = (shifted(1.0) - shifted(-1.0)) / (2.0 * SMALL_CRUSH)
+    fv = (faster(1.0) - faster(-1.0)) / (2.0 * SMALL_RATE)
+    by_shape = [
+        (
+            effect.force(motion, **_shapes(place, theta, name, LOG_STEP))
+            - effect.force(motion, **_shapes(place, theta, name, -LOG_STEP))
+        )
+        / (2.0 * LOG_STEP)
+        for name in place.shapes
+    ]
+    return f, fx, fv, by_shape
+
+
+def _factor(place: Place, theta, rate, dt):
+    """c; h and its derivatives by the shape constants; dh/dV."""
+    effect, shapes = place.addition.effect, _shapes(place, theta)
+    h = [effect.factor(rate, **shapes)]
+    step = 1e-3  # m/s: a power below 1 has an infinite slope at rest, where only its mean over a step counts
+    dh = (effect.factor(rate + step, **shapes) - effect.factor(rate - step, **shapes)) / (2.0 * step)
+    for name in place.shapes:
+        up = effect.factor(rate, **_shapes(place, theta, name, LOG_STEP))
+        down = effect.factor(rate, **_shapes(place, theta, name, -LOG_STEP))
+        h.append((up - down) / (2.0 * LOG_STEP))
+    return theta[place.coefficient], h, dh

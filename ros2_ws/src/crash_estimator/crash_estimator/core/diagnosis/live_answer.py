@@ -1,0 +1,83 @@
+"""What can be said of a test at a moment of its replay, and after its last sample: one form for both."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..structure import EffectSpec
+from .answer import Ranked
+from .diagnosis import Diagnosis
+from .layout import Layout
+from .misfit import MisfitWindow, misfit_windows
+from .records import Record
+from .whiteness import Whiteness
+
+
+class Change(NamedTuple):
+    """Of the model as it is, and with what was found missing."""
+
+    before: float
+    after: float
+
+
+class FitCurves(NamedTuple):
+    """Measured and fitted outputs of one model on one recording: n samples of q outputs."""
+
+    effects: tuple[EffectSpec, ...]  # what was found, and is in this fit beside the model's own
+    names: tuple[str, ...]  # of the outputs: the body, or its channel where several measure it
+    units: tuple[str, ...]
+    time_ns: np.ndarray  # (n,) int64, ns since the impact
+    measured: np.ndarray  # (n, q) zero offset removed, NaN where not valid
+    predicted: np.ndarray  # (n, q)
+    noise: np.ndarray  # (q,) standard deviation of one sample
+
+
+class LiveAnswer(NamedTuple):
+    verdict: str  # effect_missing, adequate or unexplained
+    text: str  # one readable line
+    ranking: tuple[Ranked, ...]  # best first
+    found: tuple[EffectSpec, ...]  # what is missing, one added after the other; with its constants where that is final
+    rms: Change  # m/s^2
+    free_run: Change  # m/s^2; NaN before the last sample
+    noise_floor: float  # m/s^2
+    white: tuple[Whiteness, Whiteness]  # before and after
+    misfit: tuple[MisfitWindow, ...]  # of the recording that is replayed
+    fits: tuple[FitCurves, ...]  # of the model as it is, then with each effect that was found
+    final: bool = False
+
+
+def final_answer(found: Diagnosis) -> LiveAnswer:
+    """The offline answer; of its recordings the first is the one that is replayed."""
+    first, last = found.models[0], found.models[-1]
+    present = len(first.additions)
+    effects = found.structure.effects[present:]
+    return LiveAnswer(
+        verdict=found.verdict,
+        text=found.text,
+        ranking=found.ranking,
+        found=effects,
+        rms=Change(found.residual_rms.before, found.residual_rms.after),
+        free_run=Change(found.free_run_rms.before, found.free_run_rms.after),
+        noise_floor=found.residual_rms.noise_floor,
+        white=(first.left.whiteness, last.left.whiteness),
+        misfit=misfit_windows(first.fit.layout, first.records[:1], first.left),
+        fits=tuple(
+            curves(model.fit.layout, model.records[0], model.left.predicted[0], effects[: len(model.additions) - present])
+            for model in found.models
+        ),
+        final=True,
+    )
+
+
+def curves(layout: Layout, record: Record, predicted: np.ndarray, effects: tuple[EffectSpec, ...]) -> FitCurves:
+    """predicted: (n, q) at the record's samples."""
+    bodies = [layout.structure.bodies[output.body].name for output in layout.outputs]
+    return FitCurves(
+        effects,
+        tuple(o.channel if bodies.count(body) > 1 else body for o, body in zip(layout.outputs, bodies)),
+        tuple("N" if output.fixed else "m/s^2" for output in layout.outputs),
+        np.round(record.time[record.at] * 1e9).astype(np.int64),
+        record.measured,
+        predicted,
+        record.noise,
+    )

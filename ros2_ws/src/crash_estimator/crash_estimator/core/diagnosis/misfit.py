@@ -1,0 +1,80 @@
+"""Where a model fails: time windows in which the residual leaves its band, the body, and what its elements do then."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..estimate import ElementState
+from .assess import Left, output_scale
+from .layout import Layout
+from .records import Record
+
+WINDOW = 2e-3
+"""s: over which the residual's mean square is taken."""
+
+SIGMAS = 4.0
+"""Band of that mean square, in its own standard deviations."""
+
+LEAST_RATIO = 1.5
+"""And the least mean square, in that of the noise, that counts as leaving the band."""
+
+
+class MisfitWindow(NamedTuple):
+    start: float  # s since the impact
+    end: float  # s
+    body: str
+    state: str  # loading, unloading or apart: of the body's element that carries most
+    rms: float  # m/s^2
+    recording: str  # id of the test
+    measured: float  # m/s^2, mean over the window; a force counts divided by the mass of all free bodies
+    predicted: float  # m/s^2
+
+
+def misfit_windows(layout: Layout, records: Sequence[Record], left: Left) -> tuple[MisfitWindow, ...]:
+    """Windows in order of time, record by record."""
+    found = []
+    for r, record in enumerate(records):
+        time = record.time[record.at]
+        length = max(int(round(WINDOW / float(np.median(np.diff(time))))), 4)
+        for q, output in enumerate(layout.outputs):
+            residual, scale = left.residual[r][:, q], output_scale(layout)[q]
+            z2 = np.nan_to_num(residual / record.noise[q]) ** 2
+            mean = np.convolve(z2, np.full(length, 1.0 / length), "same")
+            outside = mean > max(LEAST_RATIO, 1.0 + SIGMAS * np.sqrt(2.0 / length))
+            for first, last in _runs(outside, length):
+                within = slice(first, last + 1)
+                found.append(
+                    MisfitWindow(
+                        start=float(time[first]),
+                        end=float(time[last]),
+                        body=layout.structure.bodies[output.body].name,
+                        state=_state(layout, left, r, output.body, record.at[within]),
+                        rms=float(scale * np.sqrt(np.nanmean(residual[within] ** 2))),
+                        recording=record.test.id,
+                        measured=float(scale * np.nanmean(record.measured[within, q])),
+                        predicted=float(scale * np.nanmean(left.predicted[r][within, q])),
+                    )
+                )
+    order = [record.test.id for record in records]
+    return tuple(sorted(found, key=lambda w: (order.index(w.recording), w.start, w.body)))
+
+
+def _runs(outside: np.ndarray, length: int) -> list[tuple[int, int]]:
+    """First and last index of each stretch; stretches less than a window apart are one."""
+    index = np.flatnonzero(outside)
+    if not len(index):
+        return []
+    breaks = np.flatnonzero(np.diff(index) > length)
+    return list(zip(index[np.r_[0, breaks + 1]].tolist(), index[np.r_[breaks, len(index) - 1]].tolist()))
+
+
+def _state(layout: Layout, left: Left, r: int, body: int, at: np.ndarray) -> str:
+    mine = [force for link, force in zip(layout.links, left.links[r]) if body in link.ends]
+    if not mine:
+        return ElementState.APART.name.lower()
+    busiest = max(mine, key=lambda force: float(np.abs(force.force[at]).mean()))
+    if busiest.apart[at].mean() > 0.5:
+        return ElementState.APART.name.lower()
+    state = ElementState.UNLOADING if busiest.unloads[at].mean() > 0.5 else ElementState.LOADING
+    return state.name.lower()

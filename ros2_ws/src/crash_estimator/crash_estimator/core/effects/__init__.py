@@ -1,0 +1,40 @@
+"""The vocabulary of physical effects: one file each, in this table."""
+
+from . import (
+    added_mass,
+    bottoming_out,
+    channel_delay,
+    channel_gain,
+    channel_offset,
+    clearance,
+    constant_force,
+    coulomb_friction,
+    cubic_stiffness,
+    load_path,
+    plastic_unloading,
+    quadratic_damping,
+    rate_hardening,
+    unmodelled_body,
+    viscous_damping,
+)
+from .base import Effect
+
+_FILES = (
+    viscous_damping,
+    quadratic_damping,
+    coulomb_friction,
+    rate_hardening,
+    cubic_stiffness,
+    clearance,
+    bottoming_out,
+    plastic_unloading,
+    load_path,
+    added_mass,
+    unmodelled_body,
+    constant_force,
+    channel_delay,
+    channel_gain,
+    channel_offset,
+)
+
+EFFECTS: dict[str, Effect] = {file.EFFECT.name: file.EFFECT for file in _FILES}

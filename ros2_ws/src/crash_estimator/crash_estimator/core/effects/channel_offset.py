@@ -1,0 +1,7 @@
+"""A channel's zero jumps at the impact: recorded = true + c from time zero on, c in m/s^2, within 5 g."""
+
+from .base import ChannelError
+
+LIMIT = 5.0 * 9.80665
+
+EFFECT = ChannelError("channel_offset", "m/s^2", low=-LIMIT, high=LIMIT, size=0.5 * LIMIT, role="offset")

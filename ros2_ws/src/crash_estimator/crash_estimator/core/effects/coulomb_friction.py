@@ -1,0 +1,18 @@
+"""Dry friction: F = c tanh(V / speed), a constant force against the motion.
+
+V is the rate of crush in m/s, compression positive; c in N, never negative. The smoothing speed, at which
+friction has reached three quarters of its force, is found.
+"""
+
+import numpy as np
+
+from .base import ElementForce, ElementMotion, Shape
+
+
+def force(motion: ElementMotion, speed: float):
+    return np.tanh(motion.rate / speed)
+
+
+EFFECT = ElementForce(
+    "coulomb_friction", "N", {"speed": Shape("m/s", 0.01, 1.0, (0.1,))}, force=force
+)

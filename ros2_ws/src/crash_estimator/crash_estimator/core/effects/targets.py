@@ -1,0 +1,79 @@
+"""What an effect can act on, and whether a model's effect is one that there is."""
+
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from itertools import permutations
+
+from crash_replay.recording import Test
+
+from ..structure import EffectSpec, ModelError, Structure
+from .base import AttachedBody, BodyForce, BodyInertia, ChannelError, Effect, PairSpring
+
+NOUN = {"element": "an element", "body": "a free body", "channel": "a channel", "between": "two bodies"}
+
+
+def key_of(effect: Effect) -> str:
+    """What the target is called in a model file: element, body, channel or between."""
+    match effect:
+        case PairSpring():
+            return "between"
+        case AttachedBody() | ChannelError():
+            return "channel"
+        case BodyInertia() | BodyForce():
+            return "body"
+    return "element"
+
+
+def possible_targets(structure: Structure, effect: Effect, test: Test | None = None) -> list[str] | None:
+    """All that an effect of this kind can act on; None: any channel that the model does not use, the test is unknown."""
+    match key_of(effect):
+        case "element":
+            return [element.name for element in structure.elements]
+        case "body":
+            return [body.name for body in structure.bodies if body.free]
+        case "between":
+            return [f"{a.name}-{b.name}" for a, b in permutations(structure.bodies, 2) if a.free or b.free]
+    used = [name for body in structure.bodies for name in (*body.acceleration, body.force) if name]
+    if isinstance(effect, ChannelError):
+        return used
+    if test is None:
+        return None
+    return [c.name for c in test.channels if c.quantity == "acceleration" and c.name not in used]
+
+
+def checked(
+    structure: Structure, spec: EffectSpec, effects: Mapping[str, Effect], test: Test | None = None
+) -> Effect:
+    """The effect that a model's entry means.
+
+    Raises ModelError with one line where there is no such effect, or its target, shape constant or body is not one.
+    """
+    effect = _known(structure, spec.type, effects)
+    what = f"model {structure.name}: effect {spec.type}"
+    targets = possible_targets(structure, effect, test)
+    if targets is not None and spec.target not in targets:
+        raise ModelError(
+            f"{what} cannot act on {spec.target!r}; it needs {NOUN[key_of(effect)]}: {_choice(spec.target, targets)}"
+        )
+    for name in spec.shape:
+        if name not in effect.shapes:
+            raise ModelError(f"{what} has no shape constant {name!r}; it has {', '.join(effect.shapes) or 'none'}")
+    bodies = [body.name for body in structure.bodies]
+    for role in ("host", "touches", "taken_from"):
+        name = getattr(spec, role)
+        if name is not None and name not in bodies:
+            raise ModelError(f"{what} on {spec.target}: {role} must be a body, got {name!r}; {_choice(name, bodies)}")
+    return effect
+
+
+def _known(structure: Structure, name: str, effects: Mapping[str, Effect]) -> Effect:
+    if name not in effects:
+        near = get_close_matches(name, effects, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else f"; there are {', '.join(effects)}"
+        raise ModelError(f"model {structure.name}: there is no effect {name!r}{hint}")
+    return effects[name]
+
+
+def _choice(name: str, known: Sequence[str]) -> str:
+    near = get_close_matches(name, known, n=1)
+    return f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}" if known else "there is none"
