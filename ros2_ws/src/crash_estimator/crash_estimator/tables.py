@@ -46,6 +46,16 @@ def parameter_table(description: Description, estimates: Sequence[Estimate]) -> 
     return table(("parameter at peak force", "value", "sigma", "unit", "status", "at ms", "crush mm", "force kN"), rows)
 
 
+def besides_table(description: Description, last: Estimate) -> str:
+    """What the method knows besides the parameters, after the last sample: a noise model, weights, masses."""
+    rows = [
+        (name, f"{value:.4g}", "" if np.isnan(std) else f"{std:.2g}", unit)
+        for name, value, std, unit in zip(description.extra, last.extra, last.extra_std, description.extra_units)
+        if not np.isnan(value)
+    ]
+    return table(("method, after the last sample", "value", "sigma", "unit"), rows)
+
+
 def error_table(errors: Sequence[EquationError]) -> str:
     """Mean and standard deviation of measurement and error per equation (tables 5.1 and 5.2 give variances)."""
     rows = []

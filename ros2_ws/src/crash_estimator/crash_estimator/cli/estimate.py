@@ -13,7 +13,7 @@ from ..core.estimate import Description, Estimate, ParameterStatus
 from ..core.fold import run
 from ..core.methods import METHODS, make_estimator
 from ..model_file import load_model, ready_models
-from ..tables import error_table, parameter_table
+from ..tables import besides_table, error_table, parameter_table
 from .common import guarded, parse_settings, write_json
 
 
@@ -23,6 +23,11 @@ def main() -> None:
     parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
     parser.add_argument("--method", default="constrained_kalman", choices=METHODS)
     parser.add_argument("--set", nargs="*", default=[], metavar="NAME=VALUE", help="settings of the method")
+    parser.add_argument(
+        "--effective-mass",
+        action="store_true",
+        help="find the masses that go with the accelerometers first, the other parameters with them",
+    )
     parser.add_argument("--json", metavar="FILE", help="write everything that was found")
     arguments = parser.parse_args()
     sys.exit(guarded(lambda: estimate(arguments)))
@@ -31,7 +36,7 @@ def main() -> None:
 def estimate(arguments: argparse.Namespace) -> None:
     structure = load_model(arguments.model)
     recording = read_bag(arguments.bag)
-    settings = parse_settings(arguments.set)
+    settings = parse_settings(arguments.set) | ({"effective_mass": True} if arguments.effective_mass else {})
     estimator = make_estimator(structure, recording.test, arguments.method, **settings)
     estimates = run(estimator, recording.samples())
     description, errors = estimator.description, equation_errors(estimator.description, estimates)
@@ -40,6 +45,9 @@ def estimate(arguments: argparse.Namespace) -> None:
     print(parameter_table(description, estimates))
     print()
     print(error_table(errors))
+    if description.extra:
+        print()
+        print(besides_table(description, estimates[-1]))
     if arguments.json:
         write_json(arguments.json, as_json(recording, description, estimates, errors))
 
@@ -60,7 +68,8 @@ def as_json(
         "method": description.method,
         "samples": len(recording),
         "units": dict(zip(description.parameters, description.parameter_units))
-        | dict(zip(description.equations, description.equation_units)),
+        | dict(zip(description.equations, description.equation_units))
+        | dict(zip(description.extra, description.extra_units)),
         "parameters": {
             name: {
                 "value": float(last.parameters[k]),
@@ -69,6 +78,10 @@ def as_json(
                 "status": ParameterStatus(last.status[k]).name.lower(),
             }
             for k, name in enumerate(description.parameters)
+        },
+        "besides": {
+            name: {"value": value, "std": std, "unit": unit}
+            for name, unit, value, std in zip(description.extra, description.extra_units, last.extra, last.extra_std)
         },
         "equations": {row.equation: row._asdict() for row in errors},
         "events": [
@@ -81,6 +94,7 @@ def as_json(
             "parameters": series("parameters", description.parameters),
             "std": series("std", description.parameters),
             "status": series("status", description.parameters),
+            "besides": series("extra", description.extra),
             "measured": series("measured", description.equations),
             "predicted": series("predicted", description.equations),
             "innovation": series("innovation", description.equations),

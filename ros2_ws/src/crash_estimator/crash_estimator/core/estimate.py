@@ -14,6 +14,7 @@ class ParameterStatus(IntEnum):
     UNLOADING = 2  # held while its element unloads along its known slope
     APART = 3  # its element carries nothing
     CLAMPED = 4  # held at its bound for this step
+    METHOD = 5  # no parameter of the model: what the method knows besides, such as a noise model or a weight
 
 
 class ElementState(IntEnum):
@@ -27,7 +28,7 @@ class ElementState(IntEnum):
 class Event(NamedTuple):
     """Something happened at a sample."""
 
-    # loading | unloading | apart | clamped | rewound | jump | orders | released | lost | dropout | effect | reset
+    # loading | unloading | apart | clamped | rewound | jump | orders | released | masses | lost | dropout | effect | reset
     kind: str
     target: str  # element, parameter, equation or channel
     value: float  # crush in m, index steps, probability: as the text says
@@ -48,6 +49,7 @@ class Description(NamedTuple):
     bodies: tuple[str, ...]
     masses: tuple[float, ...]  # kg, NaN where the model gives none (driven, fixed)
     extra: tuple[str, ...] = ()  # what the method knows besides the parameters: "car.ar1", "model0.weight", ...
+    extra_units: tuple[str, ...] = ()
 
 
 class Estimate(NamedTuple):
@@ -74,6 +76,7 @@ class Estimate(NamedTuple):
     acceleration: np.ndarray  # (b,) m/s^2, measured, zero offset removed; NaN where not measured
     events: tuple[Event, ...]
     extra: tuple[float, ...] = ()  # the values of Description.extra, NaN until there are any
+    extra_std: tuple[float, ...] = ()  # of each, NaN where none is known
 
     @property
     def std(self) -> np.ndarray:

@@ -45,7 +45,7 @@ class Estimator:
         self.regressor = Regressor(structure)
         self.structure = structure
         self.method = method
-        parameters = structure.parameters
+        parameters, extra = structure.parameters, self._extra_names()
         self.description = Description(
             model=structure.name,
             method=method_name,
@@ -57,13 +57,14 @@ class Estimator:
             between=tuple(e.between for e in structure.elements),
             bodies=tuple(b.name for b in structure.bodies),
             masses=tuple(b.mass or float("nan") for b in structure.bodies),
-            extra=self._extra_names(),
+            extra=tuple(extra),
+            extra_units=tuple(extra.values()),
         )
 
-    def _extra_names(self) -> tuple[str, ...]:
-        """What the method knows besides the parameters, such as a noise model; most methods nothing."""
+    def _extra_names(self) -> dict[str, str]:
+        """Name -> unit of what the method knows besides the parameters, such as a noise model; most methods nothing."""
         names = getattr(self.method, "extra_names", None)
-        return names(tuple(self.structure.bodies[k].name for k in self.structure.equations)) if names else ()
+        return names(tuple(self.structure.bodies[k].name for k in self.structure.equations)) if names else {}
 
     def init(self) -> State:
         p, q = len(self.description.parameters), len(self.description.equations)
@@ -129,6 +130,7 @@ class Estimator:
         status: np.ndarray,
         events: tuple[Event, ...],
     ) -> Estimate:
+        unknown = (float("nan"),) * len(self.description.extra)
         predicted = regression.known + regression.gradient @ update.theta + update.expected_error[1]
         before = regression.known + regression.gradient @ theta_before + update.expected_error[0]
         # the part of the innovation that the update did not explain: R S^-1 R for an optimal gain, at most S
@@ -155,5 +157,6 @@ class Estimator:
             velocity=motion.velocity,
             acceleration=motion.acceleration,
             events=events,
-            extra=update.extra or (float("nan"),) * len(self.description.extra),
+            extra=update.extra or unknown,
+            extra_std=update.extra_std or unknown,
         )

@@ -18,6 +18,7 @@ from .estimators.kalman import Kalman
 from .estimators.order_bank import OrderBank
 from .estimators.rls import Rls
 from .estimators.update import theta_settings
+from .mass_first import MassFirst
 from .structure import ModelError, Structure
 
 
@@ -63,19 +64,30 @@ METHODS: dict[str, Recipe] = {
 
 
 def make_estimator(
-    structure: Structure, test: Test, method: str, damping_after: float | None = None, compiled: bool = True, **settings
+    structure: Structure,
+    test: Test,
+    method: str,
+    damping_after: float | None = None,
+    effective_mass: bool = False,
+    compiled: bool = True,
+    **settings,
 ) -> AnyEstimator:
     """An estimator of the structure's parameters (effective_mass: of its masses) on a test's channels.
 
     method: a key of METHODS; settings: fields of that method's dataclass, such as forgetting=0.98; damping_after: hold
-    each damping at its initial value until its element's stiffness is known to this share of its value; compiled: use
-    the compiled form where there is one (it agrees with the readable one but for rounding).
+    each damping at its initial value until its element's stiffness is known to this share of its value; effective_mass:
+    find the masses first, and the method's parameters with them; compiled: use the compiled form where there is one (it agrees with the readable one but for rounding).
     Raises ModelError or RecordingError where the model does not fit the test, or a setting does not exist.
     """
     if method not in METHODS:
         near = get_close_matches(method, METHODS, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise ModelError(f"there is no method {method!r}, only {', '.join(METHODS)}{hint}")
+    if effective_mass and method != "effective_mass":
+        masses = EffectiveMass(structure, test, MassSettings(theta_settings(structure)))
+        return MassFirst(
+            structure, masses, lambda s: make_estimator(s, test, method, damping_after, False, compiled, **settings)
+        )
     recipe = METHODS[method]
     known = [f.name for f in fields(recipe.kind) if f.init and f.name != "settings"]
     for name in settings:

@@ -4,7 +4,7 @@ The assumed stiffness curves are in figures that its text lacks. Those here chan
 1.5 ms at the impact's speed, by factors of up to four.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -22,6 +22,8 @@ from crash_replay.synthetic.system import Body, Element, System
 RATE = 1000.0  # Hz
 NOISE_SHARE = 0.37
 """Of each output's standard deviation, from tables 5.1 and 5.2."""
+ARMA_SETTLED = 100
+"""Samples until the noise has forgotten that it began with nothing."""
 STEP = 0.02
 """m of crush over which a stiffness changes."""
 
@@ -127,12 +129,32 @@ def trials(scenario: Scenario, seeds: int) -> tuple[Truth, Iterator[Trial]]:
 
 def vibrating(scenario: Scenario, seeds: int) -> tuple[Truth, Iterator[Trial]]:
     """4.5.1: plus 10 sin(0.3 t), t in ms, and white noise of variance 10."""
+
+    def noise(time: np.ndarray, generator: np.random.Generator) -> np.ndarray:
+        return 10.0 * np.sin(0.3 * time * 1e3) + np.sqrt(10.0) * generator.standard_normal(len(time))
+
+    return _plus(scenario, seeds, noise)
+
+
+def arma(scenario: Scenario, seeds: int) -> tuple[Truth, Iterator[Trial]]:
+    """The same with noise that is ARMA(1,2): its coefficients are the best fit to `vibrating`'s, its variance 60 too."""
+
+    def noise(time: np.ndarray, generator: np.random.Generator) -> np.ndarray:
+        eps = np.sqrt(18.0) * generator.standard_normal(len(time) + ARMA_SETTLED)
+        e = np.zeros(len(eps))
+        for t in range(2, len(e)):
+            e[t] = 0.78 * e[t - 1] + eps[t] - 0.05 * eps[t - 1] + 0.27 * eps[t - 2]
+        return e[ARMA_SETTLED:]
+
+    return _plus(scenario, seeds, noise)
+
+
+def _plus(scenario: Scenario, seeds: int, noise: Callable) -> tuple[Truth, Iterator[Trial]]:
     exact, truth = record(scenario.ideal(), 0)
-    sine = 10.0 * np.sin(0.3 * exact.time * 1e3)
 
     def one(seed: int) -> Trial:
-        noise = sine + np.sqrt(10.0) * np.random.default_rng(seed).standard_normal(len(exact))
-        return Trial(Recording(exact.test, exact.time_ns, exact.values + noise[:, None]), {"car_ax": np.sqrt(10.0)})
+        added = noise(exact.time, np.random.default_rng(seed))
+        return Trial(Recording(exact.test, exact.time_ns, exact.values + added[:, None]), {"car_ax": np.sqrt(10.0)})
 
     return truth, (one(seed) for seed in range(seeds))
 

@@ -31,7 +31,10 @@ def write_page(folder: Path, seeds: int) -> None:
     figures = folder / "thesis"
     figures.mkdir(parents=True, exist_ok=True)
     page = [HEAD.format(seeds=seeds)]
-    page += chapter_4([noise_orders(which, seeds) for which in cases.CHAPTER_4], figures)
+    thesis, of_the_model = (
+        [noise_orders(which, seeds, noise=noise) for which in cases.CHAPTER_4] for noise in (cases.vibrating, cases.arma)
+    )
+    page += chapter_4(thesis, of_the_model, figures)
     frontal, side = ratios(cases.frontal(), "frontal", FRONTAL, seeds), ratios(cases.side(), "side", SIDE, seeds)
     others = {
         "frontal, K changes within 2 mm": ratios(cases.frontal(step=0.002), "frontal", FRONTAL, seeds),
@@ -44,7 +47,7 @@ def write_page(folder: Path, seeds: int) -> None:
         ),
     }
     page += chapter_5(frontal, side, others, figures)
-    page += chapter_6(dummy(seeds), figures)
+    page += chapter_6(dummy(seeds), dummy(seeds, offsets=True), figures)
     page += rates(sampling(5), figures)
     page += twins(alike(5))
     path = write_markdown(folder / "thesis.md", page)

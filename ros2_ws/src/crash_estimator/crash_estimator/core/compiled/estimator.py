@@ -48,7 +48,8 @@ class CompiledEstimator:
         offsets = np.zeros(self.size.offsets)  # their variance is known at the first update
         memory[fields["covariance"]] = np.diag(np.concatenate([plan.std**2, offsets])).ravel()
         memory[fields["noise"]] = np.nan
-        memory[fields["information"]] = memory[fields["spread"]] = np.diag(1.0 / plan.std**2).ravel()
+        memory[fields["information"]] = np.diag(1.0 / plan.std**2).ravel()
+        memory[fields["carried"]] = np.diag(plan.std**2).ravel()
         memory[fields["gamma"]] = 1.0
         return CompiledState(memory, None)
 

@@ -9,7 +9,7 @@ from .motion import APART, UNLOADING, move, regress, touch
 from .rls import rls_step
 from .views import row_views, state_views
 
-ESTIMATED, KNOWN, UNLOADS, SEPARATE, CLAMPED = (float(status) for status in ParameterStatus)
+ESTIMATED, KNOWN, UNLOADS, SEPARATE, CLAMPED, _ = (float(status) for status in ParameterStatus)
 
 
 @njit(cache=True)

@@ -43,7 +43,7 @@ def state_fields(size: Size) -> dict[str, tuple[int, ...]]:
         "covariance": (p + n, p + n),  # with the offsets' errors at its end
         "noise": (q,),  # R2 of the Kalman filter, slow residual variance of RLS; NaN until the first update
         "information": (p, p),  # RLS from here on
-        "spread": (p, p),
+        "carried": (p, p),
         "error_covariance": (q, q),
         "gamma": (1,),
         "window_gradient": (m, q, p),
@@ -52,6 +52,8 @@ def state_fields(size: Size) -> dict[str, tuple[int, ...]]:
         "window_active": (m, p),
         "window_dt": (m,),
         "window_error": (m, q),
+        "window_influence": (m, p, q),
+        "window_variance": (m, q),
     }
 
 

@@ -41,8 +41,11 @@ def _submatrix_inverse(matrix, keep):
 
 
 @njit(cache=True)
-def correct(plan, method, s, gradient, target, active, learnt, dt, multiplier, error, clamped):
-    """One step of the recursion in place; fills error (q,) (NaN where not measured) and clamped (p,)."""
+def correct(plan, method, s, gradient, target, active, learnt, dt, multiplier, error, clamped, gain):
+    """One step of the recursion in place; fills error (q,) (NaN where not measured), clamped (p,) and gain (p, q).
+
+    The influence of the sample itself is left to the caller.
+    """
     p, q = len(s.theta), len(target)
     forgetting = method.forgetting if method.forgetting == method.forgetting else np.exp(-dt / method.memory)
     s.gamma[0] = 1.0 / (forgetting / s.gamma[0] + 1.0)
@@ -77,7 +80,6 @@ def correct(plan, method, s, gradient, target, active, learnt, dt, multiplier, e
             for i in range(q):
                 gained += gradient[i, j] * weighted[i, k]
             s.information[j, k] = fade_j * s.information[j, k] * fade_k + gained
-            s.spread[j, k] = fade_j**2 * s.spread[j, k] * fade_k**2 + gained
     free = excited.copy()
     clamped[:] = 0.0
     start = s.theta.copy()
@@ -91,16 +93,18 @@ def correct(plan, method, s, gradient, target, active, learnt, dt, multiplier, e
                     residual[i] -= gradient[i, j] * start[j]
         pull = weighted.T @ residual
         inverse = _submatrix_inverse(s.information, free)
+        gain[:, :] = multiplier * (inverse @ weighted.T)
         again = False
         for j in range(p):
             step = 0.0
             for k in range(p):
-                step += inverse[j, k] * pull[k] * free[k]
+                step += inverse[j, k] * pull[k]
             step *= multiplier
-            if multiplier != 1.0:
-                limit = method.step_limit * plan.scale[j]
+            limit = method.step_limit * plan.scale[j]
+            if multiplier != 1.0 and abs(step) > limit:
+                gain[j] *= limit / abs(step)
                 step = min(max(step, -limit), limit)
-            s.theta[j] = start[j] + step if free[j] else start[j]
+            s.theta[j] = start[j] + step
         for j in range(p):
             if free[j] and (s.theta[j] < plan.lower[j] or s.theta[j] > plan.upper[j]):
                 start[j] = min(max(s.theta[j], plan.lower[j]), plan.upper[j])
@@ -108,19 +112,53 @@ def correct(plan, method, s, gradient, target, active, learnt, dt, multiplier, e
                 clamped[j] = 1.0
                 again = True
         if not again:
-            return
+            break
+    lessen = np.eye(p) - gain @ gradient
+    s.carried[:, :] = lessen @ s.carried @ lessen.T
+    for t in range(len(s.window_dt)):
+        s.window_influence[t] = lessen @ s.window_influence[t]
+
+
+@njit(cache=True)
+def add_influence(covariance, influence, variance):
+    """covariance += B diag(r) B', in place."""
+    p, q = influence.shape
+    for j in range(p):
+        for k in range(p):
+            for i in range(q):
+                covariance[j, k] += influence[j, i] * variance[i] * influence[k, i]
 
 
 @njit(cache=True)
 def covariance_of(s):
-    """S^-1 spread S^-1, into the state."""
+    """What has been carried on and what the window's samples add, into the state."""
     p = len(s.theta)
-    inverse = np.empty((p, p))
-    invert(s.information, inverse)
-    covariance = inverse @ s.spread @ inverse
+    covariance = s.carried.copy()
+    for t in range(len(s.window_dt)):
+        add_influence(covariance, s.window_influence[t], s.window_variance[t])
     for j in range(p):
         for k in range(p):
             s.covariance[j, k] = 0.5 * (covariance[j, k] + covariance[k, j])
+
+
+@njit(cache=True)
+def chosen_variance(s, out):
+    """m E[(mean v)^2 | mean error] of a window that is used again, for each equation."""
+    m, q, p = s.window_gradient.shape
+    covariance_of(s)
+    for i in range(q):
+        error, mean = 0.0, np.zeros(p)
+        for t in range(m):
+            if s.window_error[t, i] == s.window_error[t, i]:
+                error += s.window_error[t, i] / m
+            for j in range(p):
+                mean[j] += s.window_gradient[t, i, j] / m
+        spread = 0.0
+        for j in range(p):
+            for k in range(p):
+                spread += mean[j] * s.covariance[j, k] * mean[k]
+        share = s.noise[i] / (s.noise[i] + m * spread)
+        out[i] = m * (share * error) ** 2 + (1.0 - share) * s.noise[i]
 
 
 @njit(cache=True)
@@ -142,22 +180,26 @@ def rewind(plan, method, s, clamped):
     """Use the window again with the larger correction while that lessens the mean error -> passes made."""
     m, q = s.window_error.shape
     errors, error, held = np.empty((m, q)), np.empty(q), clamped.copy()
+    gain, chosen = np.empty((len(s.theta), q)), np.empty(q)
     passes, excess = 0, excess_of(method, s, s.window_error)
     while passes < method.rewinds and excess > 1.0:
-        theta, information, spread = s.theta.copy(), s.information.copy(), s.spread.copy()
-        error_covariance, gamma = s.error_covariance.copy(), s.gamma[0]
+        theta, information, carried = s.theta.copy(), s.information.copy(), s.carried.copy()
+        error_covariance, gamma, influence = s.error_covariance.copy(), s.gamma[0], s.window_influence.copy()
+        chosen_variance(s, chosen)
         for t in range(m):
             correct(
                 plan, method, s, s.window_gradient[t], s.window_target[t], s.window_active[t], s.window_noise[t],
-                s.window_dt[t], method.cr, error, held,
+                s.window_dt[t], method.cr, error, held, gain,
             )  # fmt: skip
+            s.window_influence[t] += gain
             errors[t] = error
         now = excess_of(method, s, errors)
         if now >= excess:
-            s.theta[:], s.information[:, :], s.spread[:, :] = theta, information, spread
-            s.error_covariance[:, :], s.gamma[0] = error_covariance, gamma
+            s.theta[:], s.information[:, :], s.carried[:, :] = theta, information, carried
+            s.error_covariance[:, :], s.gamma[0], s.window_influence[:] = error_covariance, gamma, influence
             break
         s.window_error[:, :] = errors
+        s.window_variance[:] = np.maximum(s.window_variance, chosen)
         clamped[:] = held
         excess = now
         passes += 1
@@ -165,12 +207,15 @@ def rewind(plan, method, s, clamped):
 
 
 @njit(cache=True)
-def remember(s, gradient, target, learnt, active, dt, error, m):
-    """Shift the window by one sample and put the new one at its end."""
+def remember(s, gradient, target, learnt, active, dt, error, gain, m):
+    """Shift the window by one sample and put the new one at its end; the errors of what leaves it are carried on."""
     kept = min(int(s.clock[1]), m - 1)
     first = 1 if int(s.clock[1]) == m else 0
     if first:
+        add_influence(s.carried, s.window_influence[0], s.window_variance[0])
         for t in range(m - 1):
+            s.window_influence[t] = s.window_influence[t + 1]
+            s.window_variance[t] = s.window_variance[t + 1]
             s.window_gradient[t] = s.window_gradient[t + 1]
             s.window_target[t] = s.window_target[t + 1]
             s.window_noise[t] = s.window_noise[t + 1]
@@ -183,6 +228,8 @@ def remember(s, gradient, target, learnt, active, dt, error, m):
     s.window_active[kept] = active
     s.window_dt[kept] = dt
     s.window_error[kept] = error
+    s.window_influence[kept] = gain
+    s.window_variance[kept] = s.noise
     s.clock[1] = kept + 1
 
 
@@ -207,10 +254,12 @@ def rls_step(plan, method, s, row, dt, known, gradient, active, walk, learnt, ta
                 for h in range(p):
                     total += gradient[i, j] * s.covariance[j, h] * gradient[k, h]
             row.innovation_covariance[i, k] = total
-    error = np.empty(q)
-    correct(plan, method, s, gradient, target, active, learnt, dt, 1.0, error, clamped)
-    if m:
-        remember(s, gradient, target, learnt, active, dt, error, m)
+    error, gain = np.empty(q), np.empty((p, q))
+    correct(plan, method, s, gradient, target, active, learnt, dt, 1.0, error, clamped, gain)
+    if not m:
+        add_influence(s.carried, gain, s.noise)
+    else:
+        remember(s, gradient, target, learnt, active, dt, error, gain, m)
         row.rewinds[0] = rewind(plan, method, s, clamped) if int(s.clock[1]) == m else 0
     share = dt / (dt + 4.0 * method.memory)
     for i in range(q):
@@ -218,7 +267,7 @@ def rls_step(plan, method, s, row, dt, known, gradient, active, walk, learnt, ta
         for j in range(p):
             residual -= gradient[i, j] * s.theta[j]
         if residual == residual:
-            s.noise[i] += share * (residual**2 - s.noise[i])
+            s.noise[i] += share * (max(error[i] * residual, 0.0) - s.noise[i])
         if learnt[i] == learnt[i]:
             s.noise[i] = max(s.noise[i], learnt[i])
     covariance_of(s)

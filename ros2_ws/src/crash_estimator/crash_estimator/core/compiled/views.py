@@ -24,7 +24,7 @@ class StateViews(NamedTuple):
     covariance: np.ndarray
     noise: np.ndarray
     information: np.ndarray
-    spread: np.ndarray
+    carried: np.ndarray
     error_covariance: np.ndarray
     gamma: np.ndarray
     window_gradient: np.ndarray
@@ -33,6 +33,8 @@ class StateViews(NamedTuple):
     window_active: np.ndarray
     window_dt: np.ndarray
     window_error: np.ndarray
+    window_influence: np.ndarray
+    window_variance: np.ndarray
 
 
 class RowViews(NamedTuple):
@@ -72,7 +74,7 @@ def state_views(s, n):
     c, b, e, q, m = n.channels, n.bodies, n.elements, n.equations, n.window
     p = n.estimated
     w = n.estimated + n.offsets
-    k = cuts((2, c, c, b, q, b, b, b, e, e, e, e, e, p, w * w, q, p * p, p * p, q * q, 1, m * q * p, m * q, m * q, m * p, m, m * q))
+    k = cuts((2, c, c, b, q, b, b, b, e, e, e, e, e, p, w * w, q, p * p, p * p, q * q, 1, m * q * p, m * q, m * q, m * p, m, m * q, m * p * q, m * q))
     return StateViews(
         s[k[0] : k[1]],  # clock
         s[k[1] : k[2]],  # count
@@ -91,7 +93,7 @@ def state_views(s, n):
         s[k[14] : k[15]].reshape((w, w)),  # covariance
         s[k[15] : k[16]],  # noise
         s[k[16] : k[17]].reshape((p, p)),  # information
-        s[k[17] : k[18]].reshape((p, p)),  # spread
+        s[k[17] : k[18]].reshape((p, p)),  # carried
         s[k[18] : k[19]].reshape((q, q)),  # error_covariance
         s[k[19] : k[20]],  # gamma
         s[k[20] : k[21]].reshape((m, q, p)),  # window_gradient
@@ -100,6 +102,8 @@ def state_views(s, n):
         s[k[23] : k[24]].reshape((m, p)),  # window_active
         s[k[24] : k[25]],  # window_dt
         s[k[25] : k[26]].reshape((m, q)),  # window_error
+        s[k[26] : k[27]].reshape((m, p, q)),  # window_influence
+        s[k[27] : k[28]].reshape((m, q)),  # window_variance
     )
 
 

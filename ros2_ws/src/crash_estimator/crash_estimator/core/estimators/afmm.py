@@ -70,9 +70,9 @@ class Afmm:
             if not 0.0 < getattr(self, name) < 1.0:
                 raise ModelError(f"{name} must be between 0 and 1, got {getattr(self, name):g} (setting of afmm)")
 
-    def extra_names(self, equations: tuple[str, ...]) -> tuple[str, ...]:
-        """Names of `Update.extra`: weight and time of the last jump in s, the likeliest model first; jump NaN: none."""
-        return tuple(f"model{k}.{what}" for k in range(self.models) for what in ("weight", "jump"))
+    def extra_names(self, equations: tuple[str, ...]) -> dict[str, str]:
+        """Name -> unit of `Update.extra`: weight and time of the last jump, the likeliest model first; jump NaN: none."""
+        return {f"model{k}.{what}": unit for k in range(self.models) for what, unit in (("weight", "1"), ("jump", "s"))}
 
     def init(self, equations: int) -> AfmmState:
         start = self._filter.init(equations)

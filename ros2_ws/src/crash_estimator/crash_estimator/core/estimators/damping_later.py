@@ -39,9 +39,9 @@ class DampingLater:
     def settings(self) -> Theta:
         return self.method.settings
 
-    def extra_names(self, equations: tuple[str, ...]) -> tuple[str, ...]:
+    def extra_names(self, equations: tuple[str, ...]) -> dict[str, str]:
         names = getattr(self.method, "extra_names", None)
-        return names(equations) if names else ()
+        return names(equations) if names else {}
 
     def init(self, equations: int) -> LaterState:
         s = self.settings

@@ -30,6 +30,11 @@ LARGEST_ROOT = 0.98
 COEFFICIENT_STD = 1.0
 """Of the coefficients d and a before the first sample; they start from 0, white noise. A slow error has d_1 near -1."""
 
+TRUST = 0.1
+"""While theta is far off, its misfit would pass for noise with a root near 1, which then explains the spring for good.
+So d and a wait until theta is known. Until then the colour of the noise is unknown, and slow noise tells less of theta
+than white noise of its variance: samples count with a share `TRUST` of their information."""
+
 LONGEST = 100
 """Orders above this are a mistake in the settings."""
 
@@ -46,6 +51,7 @@ class Past(NamedTuple):
 class GaussNewtonState(NamedTuple):
     rls: RlsState  # of theta, then d and a of each equation in turn
     past: tuple[Past, ...]  # the latest first
+    learning: np.ndarray  # (q,) whether the equation's d and a are estimated yet
 
 
 class NoiseModel(NamedTuple):
@@ -67,6 +73,7 @@ class GaussNewton:
     forgetting: float | None = None  # as in RLS
     memory: float = 0.005  # s, as in RLS
     noise_memory: float = 0.1  # s: of d and a, which are those of the whole record
+    known_to: float = 0.03  # d and a wait until theta adds less than this share of the noise variance; inf: they do not
 
     def __post_init__(self):
         for name in ("p", "q"):
@@ -84,19 +91,23 @@ class GaussNewton:
             raise ModelError(f"gauss_newton needs one order for each of {equations} equations, got p {p} and q {q}")
         return list(zip(p, q))
 
-    def extra_names(self, equations: tuple[str, ...]) -> tuple[str, ...]:
-        """Names of `Update.extra`: the coefficients d ("ar") and a ("ma") of each equation."""
+    def extra_names(self, equations: tuple[str, ...]) -> dict[str, str]:
+        """Name -> unit of `Update.extra`: the coefficients d ("ar") and a ("ma") of each equation."""
         named = zip(equations, self.orders(len(equations)))
-        return tuple(
-            f"{name}.{kind}{i + 1}" for name, (p, q) in named for kind, n in (("ar", p), ("ma", q)) for i in range(n)
-        )
+        return {
+            f"{name}.{kind}{i + 1}": "1" for name, (p, q) in named for kind, n in (("ar", p), ("ma", q)) for i in range(n)
+        }
 
     def init(self, equations: int) -> GaussNewtonState:
-        return GaussNewtonState(self._rls(equations).init(equations), ())
+        without = [p + q == 0 for p, q in self.orders(equations)]
+        return GaussNewtonState(self._rls(equations).init(equations), (), np.array(without))
 
     def update(self, state: GaussNewtonState, regression: Regression) -> tuple[GaussNewtonState, Update]:
         equations, parameters = regression.gradient.shape
         expected, filtered = self._predict(state.rls.theta, state.past, regression)
+        learning = self._learning(state, regression)
+        for (d, a), learns in zip(self._slices(equations), learning):
+            filtered[:, d.start : a.stop] *= learns
         theta, n = state.rls.theta[:parameters], filtered.shape[1]
         linear = regression.gradient @ theta - filtered @ state.rls.theta
         wide = regression._replace(
@@ -105,7 +116,8 @@ class GaussNewton:
             active=np.concatenate([regression.active, np.ones(n - parameters, dtype=bool)]),
             walk=np.concatenate([regression.walk, np.zeros(n - parameters)]),
         )
-        rls, update = self._rls(equations).update(self._remembered(state.rls, regression.dt), wide)
+        trust = np.where(learning, 1.0, TRUST)
+        rls, update = self._rls(equations).update(self._remembered(state.rls, regression.dt), wide, trust)
         rls = rls._replace(theta=self._stable(rls.theta, equations))
         expected_after, _ = self._predict(rls.theta, state.past, regression)
         target = regression.measured - regression.known
@@ -118,20 +130,34 @@ class GaussNewton:
             clamped=update.clamped[:parameters],
             expected_error=(expected, expected_after),
             extra=tuple(rls.theta[parameters:].tolist()),
+            extra_std=tuple(np.sqrt(np.diagonal(update.covariance)[parameters:]).tolist()),
         )
-        return GaussNewtonState(rls, past), update
+        return GaussNewtonState(rls, past, learning), update
+
+    def _learning(self, state: GaussNewtonState, regression: Regression) -> np.ndarray:
+        """(q,) Whether theta is known well enough for what is left over to be noise.
+
+        It is once a sample that would have told much at the start tells little: its spread Psi P Psi' is then below
+        `known_to` of the noise variance, plus twice what the forgetting keeps it at.
+        """
+        psi, p = regression.gradient, regression.gradient.shape[1]
+        noise = np.where(np.isnan(state.rls.residual_variance), regression.noise, state.rls.residual_variance)
+        spread = np.einsum("qp,pr,qr->q", psi, state.rls.carried[:p, :p], psi) * TRUST
+        limit = self.known_to + np.count_nonzero(regression.active) * (1.0 - self._forgetting(regression.dt))
+        told = psi**2 @ self.settings.std**2 > noise
+        return state.learning | (told & (spread < limit * noise))
+
+    def _forgetting(self, dt: float) -> float:
+        return self.forgetting if self.forgetting is not None else float(np.exp(-dt / self.memory))
 
     def _remembered(self, state: RlsState, dt: float) -> RlsState:
         """Information on d and a so much larger that the forgetting of RLS leaves what `noise_memory` leaves."""
         count, p = len(state.theta), len(self.settings.initial)
         if count == p:
             return state
-        forgetting = self.forgetting if self.forgetting is not None else float(np.exp(-dt / self.memory))
         keep = np.ones(count)
-        keep[p:] = np.sqrt(float(np.exp(-dt / self.noise_memory)) / forgetting)
-        return state._replace(
-            information=keep[:, None] * state.information * keep, spread=keep[:, None] ** 2 * state.spread * keep**2
-        )
+        keep[p:] = np.sqrt(float(np.exp(-dt / self.noise_memory)) / self._forgetting(dt))
+        return state._replace(information=keep[:, None] * state.information * keep)
 
     def noise_models(self, state: GaussNewtonState) -> list[NoiseModel]:
         """The noise model of each equation, as known after the last sample."""

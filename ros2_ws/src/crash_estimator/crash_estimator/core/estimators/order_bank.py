@@ -46,9 +46,9 @@ class OrderBank:
         members = tuple(GaussNewton(self.settings, p, q, self.forgetting, self.memory) for p, q in orders)
         object.__setattr__(self, "members", members)
 
-    def extra_names(self, equations: tuple[str, ...]) -> tuple[str, ...]:
-        """Names of `Update.extra`: the orders chosen."""
-        return ("noise_model.p", "noise_model.q")
+    def extra_names(self, equations: tuple[str, ...]) -> dict[str, str]:
+        """Name -> unit of `Update.extra`: the orders chosen."""
+        return {"noise_model.p": "1", "noise_model.q": "1"}
 
     def init(self, equations: int) -> OrderBankState:
         states = tuple(member.init(equations) for member in self.members)
@@ -71,7 +71,7 @@ class OrderBank:
         events = updates[chosen].events
         if chosen != state.chosen:
             events += (Event("orders", "noise model", float(10 * p + q), f"noise model: p {p}, q {q}"),)
-        return state._replace(chosen=chosen), updates[chosen]._replace(extra=(float(p), float(q)), events=events)
+        return state._replace(chosen=chosen), updates[chosen]._replace(extra=(float(p), float(q)), extra_std=(), events=events)
 
     def criteria(self, state: OrderBankState) -> np.ndarray:
         """(members, q) the criterion of each member for each equation; smaller is better."""

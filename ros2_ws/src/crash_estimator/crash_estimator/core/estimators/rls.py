@@ -11,6 +11,16 @@ MRLS: where the moving mean of E over m samples leaves its limit, the index goes
 are used again with the correction multiplied by cr, each step clipped to theta_lmt; theta, R and Lambda carry
 on. This is repeated until the mean is within its limit, or `rewinds` times. Figure 5.1 has no guard against a
 correction that overshoots; here a pass that leaves a larger mean than it found is taken back and ends the rewinding.
+
+Covariance of theta: each step is linear, theta += G (y - Psi theta) with whatever gain G was used, so that the errors v
+of the measurements, of variance r, pass through it as
+
+    error of theta <- (I - G Psi) error + G v
+
+A sample that is used again brings the same v again, not a new one. So the part B_i of each sample of the window in the
+error, error = carried + sum B_i v_i, is kept until the sample leaves the window:
+
+    B_j <- (I - G Psi) B_j for all j,    B_i += G for the sample used,    covariance = cov(carried) + sum B_i r B_i'
 """
 
 from dataclasses import dataclass
@@ -29,12 +39,22 @@ NOISE_FLOOR = 0.1
 class RlsState(NamedTuple):
     theta: np.ndarray  # (p,)
     information: np.ndarray  # (p, p) S = R / gamma
-    spread: np.ndarray  # (p, p) the same sum with squared weights: covariance = S^-1 spread S^-1
+    carried: np.ndarray  # (p, p) covariance of theta's error from all that was before the window
     error_covariance: np.ndarray  # (q, q) Lambda
     gamma: float
-    residual_variance: np.ndarray  # (q,) slow mean of the squared residual, for the error limits
+    residual_variance: np.ndarray  # (q,) r: slow mean of error before times error after the step
     window: tuple[Regression, ...]  # the last m regressions (MRLS)
     errors: tuple[np.ndarray, ...]  # and their errors
+    influence: tuple[np.ndarray, ...]  # B_i of each, (p, q)
+    variances: tuple[np.ndarray, ...]  # r_i of each, (q,)
+
+
+class Step(NamedTuple):
+    """What one correction did."""
+
+    gain: np.ndarray  # (p, q)
+    error: np.ndarray  # (q,) before it; NaN where not measured
+    clamped: np.ndarray  # (p,)
 
 
 @dataclass(frozen=True)
@@ -52,21 +72,22 @@ class Rls:
 
     def init(self, equations: int) -> RlsState:
         std = np.where(self.settings.std > 0, self.settings.std, 1.0)
-        information = np.diag(1.0 / std**2)
         unknown = np.full((equations, equations), np.nan)
         return RlsState(
-            self.settings.initial, information, information, unknown, 1.0, np.full(equations, np.nan), (), ()
-        )
+            self.settings.initial, np.diag(1.0 / std**2), np.diag(self.settings.std**2),
+            unknown, 1.0, np.full(equations, np.nan), (), (), (), (),
+        )  # fmt: skip
 
-    def update(self, state: RlsState, regression: Regression) -> tuple[RlsState, Update]:
+    def update(
+        self, state: RlsState, regression: Regression, trust: np.ndarray | float = 1.0
+    ) -> tuple[RlsState, Update]:
+        """trust: (q,) share of its information that an equation is counted with; its noise counts as so much larger."""
         state = self._started(state, regression)
         innovation_covariance = self._innovation_covariance(state, regression)
-        state, error, clamped = self._correct(state, regression, 1.0)
-        events: tuple[Event, ...] = ()
-        if self.m:
-            window, errors = (*state.window, regression)[-self.m :], (*state.errors, error)[-self.m :]
-            state, clamped, events = self._rewind(state._replace(window=window, errors=errors), clamped)
-        state = self._learn_residual(state, regression)
+        state, step = self._correct(state, regression, 1.0, trust)
+        state = self._remember(state, regression, step, state.residual_variance / trust)
+        state, clamped, events = self._rewind(state, step.clamped)
+        state = self._learn_residual(state, regression, step.error)
         return state, Update(state.theta, self._covariance(state), innovation_covariance, clamped, events)
 
     def _started(self, state: RlsState, regression: Regression) -> RlsState:
@@ -77,9 +98,9 @@ class Rls:
         return state._replace(error_covariance=np.diag(noise), residual_variance=noise)
 
     def _correct(
-        self, state: RlsState, regression: Regression, multiplier: float
-    ) -> tuple[RlsState, np.ndarray, np.ndarray]:
-        """One step of the recursion -> the new state, (q,) its error (NaN where not measured), (p,) clamped."""
+        self, state: RlsState, regression: Regression, multiplier: float, trust: np.ndarray | float = 1.0
+    ) -> tuple[RlsState, Step]:
+        """One step of the recursion; the influence of the sample itself is left to the caller."""
         forgetting = self.forgetting if self.forgetting is not None else float(np.exp(-regression.dt / self.memory))
         gamma = 1.0 / (forgetting / state.gamma + 1.0)
         target = regression.measured - regression.known
@@ -90,44 +111,78 @@ class Rls:
         weight = np.zeros_like(error_covariance)
         floor = NOISE_FLOOR * np.diag(np.nan_to_num(regression.noise, nan=0.0))
         weight[np.ix_(valid, valid)] = np.linalg.inv((error_covariance + floor)[np.ix_(valid, valid)])
+        weight *= np.sqrt(np.multiply.outer(trust * np.ones(len(weight)), trust * np.ones(len(weight))))
         excited = regression.active & (regression.gradient[valid] != 0.0).any(axis=0)
         fade = np.where(excited, np.sqrt(forgetting), 1.0)
         gained = regression.gradient.T @ weight @ regression.gradient
         information = fade[:, None] * state.information * fade + gained
-        spread = fade[:, None] ** 2 * state.spread * fade**2 + gained
+        gain = np.zeros(regression.gradient.shape[::-1])
 
         def solve(theta: np.ndarray, active: np.ndarray) -> np.ndarray:
             index = np.flatnonzero(active)
             residual = np.nan_to_num(target - regression.gradient @ theta)
-            pull = (regression.gradient.T @ weight @ residual)[index]
-            step = multiplier * np.linalg.solve(information[np.ix_(index, index)], pull)
+            pull = (regression.gradient.T @ weight)[index]
+            both = multiplier * np.linalg.solve(information[np.ix_(index, index)], np.column_stack([pull @ residual, pull]))
+            step, gain[:], gain[index] = both[:, 0], 0.0, both[:, 1:]
             if multiplier != 1.0:
                 limit = self.step_limit * self.settings.scale[index]
+                gain[index] *= np.minimum(1.0, limit / np.maximum(np.abs(step), 1e-300))[:, None]
                 step = np.clip(step, -limit, limit)
             updated = theta.copy()
             updated[index] += step
             return updated
 
         theta, clamped = within_bounds(solve, state.theta, excited, self.settings)
+        lessen = np.eye(len(theta)) - gain @ regression.gradient
         state = state._replace(
-            theta=theta, information=information, spread=spread, error_covariance=error_covariance, gamma=gamma
+            theta=theta,
+            information=information,
+            error_covariance=error_covariance,
+            gamma=gamma,
+            carried=lessen @ state.carried @ lessen.T,
+            influence=tuple(lessen @ part for part in state.influence),
         )
-        return state, error, clamped
+        return state, Step(gain, error, clamped)
+
+    def _remember(self, state: RlsState, regression: Regression, step: Step, variance: np.ndarray) -> RlsState:
+        """The sample joins the window; what leaves it will not be used again, its errors are carried on."""
+        state = state._replace(
+            window=(*state.window, regression),
+            errors=(*state.errors, step.error),
+            influence=(*state.influence, step.gain),
+            variances=(*state.variances, variance),
+        )
+        if len(state.window) <= self.m:
+            return state
+        old = state.influence[0]
+        return state._replace(
+            carried=state.carried + old * state.variances[0] @ old.T,
+            window=state.window[1:],
+            errors=state.errors[1:],
+            influence=state.influence[1:],
+            variances=state.variances[1:],
+        )
 
     def _rewind(self, state: RlsState, clamped: np.ndarray) -> tuple[RlsState, np.ndarray, tuple[Event, ...]]:
-        if len(state.window) < self.m:
+        if not self.m or len(state.window) < self.m:
             return state, clamped, ()
         limit = self.error_limit * np.sqrt(state.residual_variance / self.m)
         passes, excess = 0, self._excess(state.errors, limit)
         while passes < self.rewinds and excess > 1.0:
             again, errors, held = state, [], clamped
-            for regression in state.window:
-                again, error, held = self._correct(again, regression, self.cr)
-                errors.append(error)
+            for k, regression in enumerate(state.window):
+                again, step = self._correct(again, regression, self.cr)
+                influence = list(again.influence)
+                influence[k] = influence[k] + step.gain
+                again, held = again._replace(influence=tuple(influence)), step.clamped
+                errors.append(step.error)
             now = self._excess(tuple(errors), limit)
             if now >= excess:  # the large correction has overshot: it is taken back
                 break
-            state, clamped, excess, passes = again._replace(errors=tuple(errors)), held, now, passes + 1
+            chosen = self._chosen_variance(state)
+            variances = tuple(np.maximum(variance, chosen) for variance in state.variances)
+            state = again._replace(errors=tuple(errors), variances=variances)
+            clamped, excess, passes = held, now, passes + 1
         if not passes:
             return state, clamped, ()
         steps = passes * self.m
@@ -138,18 +193,26 @@ class Rls:
         """The largest moving mean of the error over its limit; above 1 the parameters are taken to have changed."""
         return float(np.max(np.abs(np.mean(np.nan_to_num(errors), axis=0)) / limit))
 
-    def _learn_residual(self, state: RlsState, regression: Regression) -> RlsState:
+    def _chosen_variance(self, state: RlsState) -> np.ndarray:
+        """(q,) m E[(mean v)^2 | mean error], v and theta's error being normal with what is known of them so far."""
+        error = np.mean(np.nan_to_num(state.errors), axis=0)
+        gradient = np.mean([regression.gradient for regression in state.window], axis=0)
+        spread = np.einsum("qp,pr,qr->q", gradient, self._covariance(state), gradient)
+        share = state.residual_variance / (state.residual_variance + self.m * spread)
+        return self.m * (share * error) ** 2 + (1.0 - share) * state.residual_variance
+
+    def _learn_residual(self, state: RlsState, regression: Regression, error: np.ndarray) -> RlsState:
+        """E[error before times error after] = r, as the gain is about optimal; the square of either is more, or less."""
         residual = regression.measured - regression.known - regression.gradient @ state.theta
         share = regression.dt / (regression.dt + 4.0 * self.memory)
-        squared = np.where(np.isnan(residual), state.residual_variance, residual**2)
+        squared = np.where(np.isnan(residual), state.residual_variance, np.maximum(error * residual, 0.0))
         variance = state.residual_variance + share * (squared - state.residual_variance)
         return state._replace(residual_variance=np.fmax(variance, regression.noise))
 
     def _covariance(self, state: RlsState) -> np.ndarray:
-        inverse = np.linalg.inv(state.information)
-        known = self.settings.std == 0.0
-        covariance = inverse @ state.spread @ inverse
-        covariance[known, :] = covariance[:, known] = 0.0
+        covariance = state.carried.copy()
+        for part, variance in zip(state.influence, state.variances):
+            covariance += part * variance @ part.T
         return 0.5 * (covariance + covariance.T)
 
     def _innovation_covariance(self, state: RlsState, regression: Regression) -> np.ndarray:

@@ -31,6 +31,7 @@ class Update(NamedTuple):
     expected_error: tuple[np.ndarray | float, np.ndarray | float] = (0.0, 0.0)
     # (q,) each: the error that a noise model expected, with theta before and after the update
     extra: tuple[float, ...] = ()  # what the method knows besides theta, named by its `extra_names`
+    extra_std: tuple[float, ...] = ()  # of each; empty: none is known
 
 
 def theta_settings(structure: Structure) -> Theta:
