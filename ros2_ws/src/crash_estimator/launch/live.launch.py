@@ -17,6 +17,7 @@ ARGUMENTS = {  # name: (default or None, meaning)
     "model": (None, "a ready model's name, or a .yaml file"),
     "method": ("constrained_kalman", "estimation method"),
     "rate": ("0.01", "replay, times real time"),
+    "diagnosis": ("false", "say which physical effect the model lacks (true: it is published as the samples come)"),
     "viewer": ("true", "show it in Rerun (false: estimate only)"),
     "rrd": ("crash.rrd", "file that the viewer writes"),
 }
@@ -31,8 +32,9 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(name, default_value=default, description=meaning)
         for name, (default, meaning) in ARGUMENTS.items()
     ]
-    viewer = LaunchConfiguration("viewer")
-    listeners = PythonExpression(["2 if '", viewer, "'.lower() in ('true', '1') else 1"])  # estimator and viewer
+    viewer, diagnosis = LaunchConfiguration("viewer"), LaunchConfiguration("diagnosis")
+    is_on = "'.lower() in ('true', '1'))"
+    listeners = PythonExpression(["1 + ('", viewer, is_on, " + ('", diagnosis, is_on])  # the estimator and these
     replay = Node(
         package="crash_replay",
         executable="replay",
@@ -52,6 +54,13 @@ def generate_launch_description() -> LaunchDescription:
         output="screen",
         parameters=[{"model": text("model"), "method": text("method")}],
     )
+    diagnose = Node(
+        package="crash_estimator",
+        executable="diagnosis",
+        output="screen",
+        parameters=[{"model": text("model")}],
+        condition=IfCondition(diagnosis),
+    )
     show = Node(
         package="crash_estimator",
         executable="viewer",
@@ -59,4 +68,4 @@ def generate_launch_description() -> LaunchDescription:
         parameters=[{"rrd": text("rrd")}],
         condition=IfCondition(viewer),
     )
-    return LaunchDescription([*arguments, replay, estimator, show])
+    return LaunchDescription([*arguments, replay, estimator, diagnose, show])

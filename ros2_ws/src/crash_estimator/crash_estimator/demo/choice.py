@@ -14,8 +14,7 @@ from crash_replay.recording import Recording, RecordingError, Test
 from ..core.structure import ModelError, Structure
 from ..model_file import load_model, ready_models
 
-BUNDLED = Path("bags/frontal_engine_cab.mcap")
-BUNDLED_MODEL = "frontal_engine_cab"
+BUNDLED = Path("bags/hidden_effect.mcap")
 METHODS_OF_ONE_MODEL = ("mrls", "constrained_kalman")
 METHOD_OF_SEVERAL_MODELS = "constrained_kalman"
 CFC_OF_VEHICLES = 60
@@ -88,7 +87,7 @@ def choose(
 
 def _node_name(model: str, method: str, several_models: bool, several_methods: bool) -> str:
     """What tells the estimators apart, as a ROS name: letters, digits and underscores."""
-    parts = [Path(model).stem] * (several_models or not several_methods) + [method] * several_methods
+    parts = [Path(model).stem.removesuffix(".model")] * (several_models or not several_methods) + [method] * several_methods
     name = re.sub(r"\W+", "_", "_".join(parts), flags=re.ASCII)
     return name if name[0].isalpha() else f"model_{name}"
 
@@ -108,6 +107,26 @@ def fitting_models(test: Test) -> list[str]:
         f"no ready model fits test {test.id} with its channels {_listed(test.channel_names)}; nearest is {nearest}, "
         f"which also wants {', '.join(missing[nearest])}: copy its file, set its channels and give it by --model"
     )
+
+
+def simplest_model(test: Test) -> str:
+    """The ready model that the test has all channels for and that explains the least: where a search begins.
+
+    Raises ModelError where there is none.
+    """
+    structures = {name: load_model(name) for name in fitting_models(test)}
+
+    def size(name: str) -> tuple[int, int]:
+        structure = structures[name]
+        return len(structure.channels()), sum(p.coefficient.estimated for p in structure.parameters)
+
+    return min(structures, key=size)
+
+
+def model_beside(recording: Path) -> str | None:
+    """NAME.model.yaml beside NAME.mcap: the model that a recording comes with."""
+    path = recording.with_name(f"{recording.stem}.model.yaml")
+    return str(path) if path.is_file() else None
 
 
 def missing_channels(structure: Structure, test: Test) -> list[str]:

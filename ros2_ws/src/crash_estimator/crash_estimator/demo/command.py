@@ -1,6 +1,6 @@
-"""`demo`: a recording replayed, estimated and shown, everything in one command.
+"""`demo`: a recording replayed, estimated, what its model lacks named and added, and all of it shown, in one command.
 
-make demo                                    the simulated frontal impact that comes with the project
+make demo                                    a simulated test with an effect that its model has not got
 make demo RECORDING=../data/nhtsa-10146      one of your own: a bag, CSV with YAML, an NHTSA or ISO-MME folder
 """
 
@@ -18,9 +18,10 @@ from ..cli.common import guarded
 from ..core.methods import METHODS
 from ..model_file import ready_models
 from .children import Children
-from .choice import BUNDLED_MODEL, Choice, as_bag, bundled_recording, choose, default_rate
+from .choice import METHOD_OF_SEVERAL_MODELS, Choice, as_bag, bundled_recording, choose, default_rate, model_beside, simplest_model
 from .domain import own_environment
-from .terminal import Terminal
+from .folder import claim
+from .terminal import Terminal, near
 
 PATIENCE_OF_REPLAY = 600.0
 """s that the replay waits for its subscribers; the demonstration lets it go on earlier where one has died."""
@@ -40,7 +41,8 @@ def _interrupt(*_) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="demo", description="Replay a recording, estimate on it and show it, everything in one command."
+        prog="demo",
+        description="Replay a recording, estimate on it, name what the model lacks, add it and show how the error falls.",
     )
     parser.add_argument(
         "--recording", type=Path, metavar="PATH",
@@ -48,17 +50,23 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument(
         "--model", action="append", default=[], metavar="M",
-        help=f"a .yaml file, or one of {', '.join(ready_models())}; may be repeated (default: the ready ones that fit)",
+        help=f"a .yaml file, or one of {', '.join(ready_models())}; may be repeated (default: the simplest that fits)",
     )  # fmt: skip
     parser.add_argument(
         "--method", action="append", default=[], choices=METHODS, help="may be repeated: they run side by side"
     )
     parser.add_argument(
         "--cfc", type=int, choices=(0, *CFC_CLASSES),
-        help="filter what is imported with this class of SAE J211-1, 0: not (default: 60 for a laboratory's folder)",
+        help="filter what is imported with this class of SAE J211-1, 0: not (default: not, or 60 for a laboratory's folder"
+        " with --no-diagnosis)",
     )  # fmt: skip
+    parser.add_argument(
+        "--with", dest="others", type=Path, action="append", default=[], metavar="PATH",
+        help="another recording of the same structure, at another speed: what one cannot tell apart, two may",
+    )  # fmt: skip
+    parser.add_argument("--no-diagnosis", action="store_true", help="estimate only, with several models or methods")
     parser.add_argument("--rate", type=_rate, help="times real time (default: such that it takes about 15 s)")
-    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for what is written (default: out)")
+    parser.add_argument("--out", type=Path, default=Path("out"), help="what is written goes below it (default: out)")
     parser.add_argument("--no-viewer", action="store_true", help="without Rerun: the terminal only")
     return parser
 
@@ -71,27 +79,38 @@ def _rate(text: str) -> float:
 
 
 def demo(arguments: argparse.Namespace) -> int:
-    """Exit status 0, or 1 where the replay or every estimator died."""
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    source = arguments.recording or bundled_recording()
-    recording, bag, lines = as_bag(source, arguments.out, arguments.cfc)
-    by_default = () if arguments.recording else (BUNDLED_MODEL,)
-    choices = choose(recording.test, arguments.model, arguments.method, by_default)
-    rate = arguments.rate or default_rate(recording.time[-1] - recording.time[0])
-    terminal = Terminal()
-    for line in (*lines, *_announcement(recording, source, choices, rate)):
-        terminal.say(line)
-    os.environ.update(own_environment())
-    terminal.say(f"other nodes can listen in with ROS_DOMAIN_ID={os.environ['ROS_DOMAIN_ID']}")
-    rrd = None if arguments.no_viewer else arguments.out / "demo.rrd"
-    with Children(arguments.out / "log", os.environ) as children:
-        _start(children, bag, choices, rate, rrd)
-        from .run import Run  # takes rclpy, while the processes start, which take it too
+    """Exit status 0, or 1 where the replay, the diagnosis or every estimator died."""
+    source, searches = arguments.recording or bundled_recording(), not arguments.no_diagnosis
+    cfc = 0 if searches and arguments.cfc is None else arguments.cfc  # a filter would hide what the sensors' noise is
+    with claim(arguments.out, source) as out:
+        recording, bag, lines = as_bag(source, out, cfc)
+        others = [as_bag(other, out, cfc)[1] for other in arguments.others]
+        choices = _choices(arguments, source, recording)
+        rate = arguments.rate or default_rate(recording.time[-1] - recording.time[0])
+        terminal = Terminal()
+        for line in (*lines, *_announcement(recording, source, choices, rate, searches)):
+            terminal.say(line)
+        os.environ.update(own_environment())
+        terminal.say(f"other nodes can listen in with ROS_DOMAIN_ID={os.environ['ROS_DOMAIN_ID']}")
+        rrd = None if arguments.no_viewer else out / "demo.rrd"
+        with Children(out / "log", os.environ) as children:
+            _start(children, bag, others, choices, rate, rrd, searches)
+            from .run import Run  # takes rclpy, while the processes start, which take it too
 
-        return Run(children, choices, terminal, rrd).to_the_end()
+            return Run(children, choices, terminal, rrd).to_the_end()
 
 
-def _announcement(recording: Recording, source: Path, choices: Sequence[Choice], rate: float) -> list[str]:
+def _choices(arguments: argparse.Namespace, source: Path, recording: Recording) -> list[Choice]:
+    """A search begins with one model: the recording's own, or the simplest that fits."""
+    if arguments.no_diagnosis:
+        return choose(recording.test, arguments.model, arguments.method)
+    models = arguments.model or [model_beside(source) or simplest_model(recording.test)]
+    return choose(recording.test, models, arguments.method or [METHOD_OF_SEVERAL_MODELS])
+
+
+def _announcement(
+    recording: Recording, source: Path, choices: Sequence[Choice], rate: float, searches: bool
+) -> list[str]:
     test, time_ms = recording.test, recording.time * 1e3
     frequency = f"{1e-3 / recording.sample_period:.4g} kHz" if recording.sample_period else "no rate"
     wall = (recording.time[-1] - recording.time[0]) / rate
@@ -99,21 +118,29 @@ def _announcement(recording: Recording, source: Path, choices: Sequence[Choice],
         f"{test.id}: {test.title or source}",
         f"{len(recording)} samples at {frequency}, {time_ms[0]:.4g} to {time_ms[-1]:.4g} ms, "
         f"replayed at {rate:g} x real time: {wall:.3g} s",
-        *(f"estimator {choice.name}: model {choice.model}, method {choice.method}" for choice in choices),
+        *(f"estimator {choice.name}: model {near(choice.model)}, method {choice.method}" for choice in choices),
+        *([f"diagnosis: what does model {near(choices[0].model)} lack?"] if searches else []),
     ]
 
 
-def _start(children: Children, bag: Path, choices: Sequence[Choice], rate: float, rrd: Path | None) -> None:
+def _start(
+    children: Children, bag: Path, others: Sequence[Path], choices: Sequence[Choice], rate: float, rrd: Path | None, searches: bool
+) -> None:  # fmt: skip
     """All at once; the one that takes longest to start first."""
     names = [choice.name for choice in choices]
     if rrd is not None:
         rrd.unlink(missing_ok=True)  # an older one must not pass for this one
-        viewer = dict(estimators=names, rrd=str(rrd.absolute()), exit_when_finished=True)
+        models = list(dict.fromkeys(choice.model for choice in choices if choice.model.endswith((".yaml", ".yml"))))
+        viewer = dict(estimators=names, models=models or [""], rrd=str(rrd.absolute()), exit_when_finished=not searches)
         children.start("viewer", "crash_estimator", "viewer", **viewer)
+    if searches:
+        same = [choice.name for choice in choices if choice.model == choices[0].model]
+        search = dict(model=choices[0].model, with_bags=[str(other) for other in others] or [""])
+        children.start("diagnosis", "crash_estimator", "diagnosis", add_first=True, estimators=same, **search)
     for choice in choices:
         parameters = dict(model=choice.model, method=choice.method)
         children.start(choice.name, "crash_estimator", "estimator", node=choice.name, **parameters)
-    listeners = len(names) + (rrd is not None) + 1  # estimators, viewer and this process
+    listeners = len(names) + searches + (rrd is not None) + 1  # estimators, diagnosis, viewer and this process
     waiting = dict(wait_for=listeners, wait_timeout=PATIENCE_OF_REPLAY)
     children.start("replay", "crash_replay", "replay", bag=str(bag), rate=rate, **waiting)
 

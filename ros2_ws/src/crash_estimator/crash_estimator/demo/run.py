@@ -14,10 +14,12 @@ from crash_replay.ros_runtime import acknowledge_promptly
 
 from ..core.errors import equation_errors
 from ..tables import error_table, parameter_table
+from ..viewer.findings import RankingBlock
 from ..viewer.native import has_display
 from .children import Child, Children
 from .choice import Choice
-from .terminal import Terminal
+from .story import Story
+from .terminal import Terminal, near
 from .watch import Watch
 
 PERIOD = 0.05
@@ -28,6 +30,9 @@ SILENCE = 3.0
 """s without a message after which nothing more is expected of a replay that has ended."""
 WRITING = 20.0
 """s that the viewer has to finish its file."""
+ANSWERING = 240.0
+"""s that the diagnosis has for its answer after the last sample, and again with what it has added."""
+MISSING = ("Missing effect", "which effect the model lacks, and its error, fit by fit; shaded where the model fails")
 LOOK_AT = (
     ("Overview", "measured and predicted acceleration; beside it, the residual leaves its 99 % band where a model fails"),
     ("Force over crush", "the loop of each element: its slope is the stiffness, what it encloses the absorbed energy"),
@@ -42,44 +47,76 @@ class Run:
     def __init__(self, children: Children, choices: Sequence[Choice], terminal: Terminal, rrd: Path | None):
         self.children, self.terminal, self.rrd = children.all, terminal, rrd
         self.choices = {choice.name: choice for choice in choices}
+        self.story = Story() if "diagnosis" in self.children else None
         self.dead: set[str] = set()  # those that ended though they should not have
+        self.gave_up = False  # the diagnosis: it says why, and nothing more
         self.ended_at = 0.0  # when the replay had ended and something came for the last time
         self.heard = 0
         self.ready_at = 0.0  # s after the start, when all estimators were there
         self.resumed = False
 
     def to_the_end(self) -> int:
-        """Exit status 0, or 1 where the replay or every estimator died."""
+        """Exit status 0, or 1 where the replay, the diagnosis or every estimator died."""
         acknowledge_promptly()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        watch, executor = Watch(list(self.choices)), EventsExecutor()
+        watch, executor = Watch(list(self.choices), ["diagnosis"] if self.story else []), EventsExecutor()
         executor.add_node(watch)
         try:
             self._follow(watch, executor)
-            self._tables(watch)
+            if self.story:
+                self._wait_for_answer(watch, executor)
+            else:
+                self._tables(watch)
             self._wait_for_viewer()
         finally:
             self.terminal.clear()
             watch.destroy_node()
             rclpy.shutdown()
-        return 1 if "replay" in self.dead or not self._alive() else 0
+        return 1 if self.dead & {"replay", "diagnosis"} or self.gave_up or not self._alive() else 0
 
     def _alive(self) -> list[str]:
         return [name for name in self.choices if name not in self.dead]
 
+    def _needed(self) -> list[str]:
+        """Nodes that live and that the replay does not begin without."""
+        return self._alive() + ["diagnosis"] * (self.story is not None and "diagnosis" not in self.dead)
+
     def _follow(self, watch: Watch, executor: Executor) -> None:
         began, encoding = time.monotonic(), self.terminal.stream.encoding
         while not self._is_over(watch):
-            until = time.monotonic() + PERIOD
-            while (left := until - time.monotonic()) > 0:
-                executor.spin_once(timeout_sec=left)
-            self._tell_of_processes()
+            self._listen(watch, executor)
             if watch.waiting:
                 waited = time.monotonic() - began
                 self.terminal.wait(self._start(watch, waited), waited)
             else:
                 self.terminal.progress(watch.progress(encoding))
         self.terminal.end_progress(watch.progress(encoding, watch.total))
+
+    def _listen(self, watch: Watch, executor: Executor) -> None:
+        until = time.monotonic() + PERIOD
+        while (left := until - time.monotonic()) > 0:
+            executor.spin_once(timeout_sec=left)
+        self._tell_of_processes()
+        for finding in watch.new_findings() if self.story else ():
+            tell = self.story.ranking if isinstance(finding, RankingBlock) else self.story.misfit
+            for line in tell(finding):
+                self.terminal.say(line)
+
+    def _wait_for_answer(self, watch: Watch, executor: Executor) -> None:
+        """Until the diagnosis has judged all samples, and the model with what it has added."""
+        began, answers = time.monotonic(), 0
+        while not (self.story.complete or self.gave_up or "diagnosis" in self.dead):
+            if len(self.story.finals) > answers:
+                began, answers = time.monotonic(), len(self.story.finals)
+            waited = time.monotonic() - began
+            if waited > ANSWERING:
+                self.terminal.say(f"the diagnosis has not answered within {ANSWERING:g} s")
+                return
+            self._listen(watch, executor)
+            self.terminal.wait("comparing every candidate on all samples" if not answers else "judging the model with it", waited)
+        self.terminal.clear()
+        for _ in range(3):  # its last curves, and what the estimators say to it
+            self._listen(watch, executor)
 
     def _is_over(self, watch: Watch) -> bool:
         if not self._alive():
@@ -100,15 +137,17 @@ class Run:
             for level, text in child.messages():
                 if level in ("WARN", "ERROR", "FATAL") or name == "viewer":
                     self.terminal.say(f"{name}: {text}")
+                self.gave_up |= name == "diagnosis" and level in ("ERROR", "FATAL")
             status = child.status
-            early = bool(status) or (name in self.choices and self.children["replay"].status is None)
+            stays = name in self.choices or name == "diagnosis"
+            early = bool(status) or (stays and self.children["replay"].status is None)
             if status is not None and early and name not in self.dead:
                 self.dead.add(name)
                 self.terminal.say(f"{name} has ended too early: {child.last_words()}")
 
     def _start(self, watch: Watch, waited: float) -> str:
         """Join in as the last, see to it that the replay begins; a line on what it waits for."""
-        alive = self._alive()
+        alive = self._needed()
         absent = watch.absent(alive)
         if absent:
             hint = ": after an update they compile their code first, half a minute" if waited > 5.0 else ""
@@ -146,6 +185,8 @@ class Run:
         if viewer is None:
             return
         self.terminal.say()
+        if self.story and viewer.status is None:
+            viewer.process.terminate()  # it would wait for more
         deadline = time.monotonic() + WRITING
         while viewer.status is None and time.monotonic() < deadline:
             time.sleep(PERIOD)
@@ -156,13 +197,23 @@ class Run:
         if viewer.status == 0:
             self.terminal.say(f"viewer {viewer.last_line()}")
             rerun = Path(sys.prefix) / "bin" / "rerun"
-            again = f"{_short(rerun)} {self.rrd}"
+            again = f"{near(rerun)} {near(self.rrd)}"
+            if self.story and not has_display():
+                self._picture()
             window = "The viewer stays open; look at it again later" if has_display() else "Look at it"
             self.terminal.say(f"\n{window} with: {again}\n\nWhat to look at, by tab:")
-            for tab, what in LOOK_AT:
+            for tab, what in ([MISSING] if self.story else []) + list(LOOK_AT):
                 self.terminal.say(f"  {tab:18} {what}")
 
+    def _picture(self) -> None:
+        """What a viewer would show at the end, where there is no screen for it."""
+        from ..viewer.screenshot import ScreenshotError, screenshot  # takes Rerun, which all else here does without
 
-def _short(path: Path) -> Path:
-    """From the working folder where the path is below it."""
-    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
+        picture = self.rrd.with_suffix(".png")
+        try:
+            screenshot(self.rrd, picture)
+        except ScreenshotError as error:
+            self.terminal.say(f"no picture of it: {error}")
+        else:
+            self.terminal.say(f"its picture: {near(picture.absolute())}")
+

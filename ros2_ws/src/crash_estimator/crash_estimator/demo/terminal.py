@@ -3,6 +3,7 @@
 import shutil
 import sys
 import time
+from pathlib import Path
 from typing import TextIO
 
 REDRAWN_EVERY = 0.1
@@ -62,6 +63,12 @@ class Terminal:
     def _write(self, text: str) -> None:
         self.stream.write(text)
         self.stream.flush()
+
+
+def near(path: Path | str) -> str:
+    """From the working folder where the path is below it; a name stays as it is."""
+    path = Path(path)
+    return str(path.relative_to(Path.cwd()) if path.is_absolute() and path.is_relative_to(Path.cwd()) else path)
 
 
 def bar(share: float, encoding: str | None) -> str:

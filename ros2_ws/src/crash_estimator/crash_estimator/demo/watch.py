@@ -2,16 +2,18 @@
 
 from collections.abc import Sequence
 
-from crash_msgs.msg import Forces, Parameters, ReplayState, Residuals, Samples, TestInfo
+from crash_msgs.msg import Forces, Misfit, Parameters, Ranking, ReplayState, Residuals, Samples, TestInfo
 from rcl_interfaces.srv import ListParameters
 from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from crash_replay.qos import EVERY_SAMPLE, LATCHED, STREAM
+from crash_replay.qos import EVERY_SAMPLE, LATCHED, SAID, STREAM
 
 from ..core.estimate import Description, Estimate
 from ..nodes.estimate_messages import description_from, estimates_from
+from ..nodes.viewer_messages import misfit_block, ranking_block
+from ..viewer.findings import MisfitBlock, RankingBlock
 from .terminal import bar
 
 TOPICS = {"parameters": Parameters, "residuals": Residuals, "forces": Forces}
@@ -68,7 +70,8 @@ class Followed:
 class Watch(Node):
     """Listens to the replay and to the estimators."""
 
-    def __init__(self, names: Sequence[str]):
+    def __init__(self, names: Sequence[str], others: Sequence[str] = ()):
+        """names: of the estimators; others: further nodes that the replay must not begin without."""
         super().__init__("demo")
         self.test: TestInfo | None = None
         self.state: ReplayState | None = None
@@ -81,7 +84,12 @@ class Watch(Node):
         for name, followed in self.followed.items():
             for topic, kind in TOPICS.items():
                 self._follow(name, topic, kind, followed)
-        self.clients_of = {name: self.create_client(ListParameters, f"{name}/list_parameters") for name in names}
+        self.findings: list[RankingBlock | MisfitBlock] = []  # that nobody has taken yet
+        for topic, kind, block in (("ranking", Ranking, ranking_block), ("misfit", Misfit, misfit_block)):
+            take = lambda message, block=block: self.findings.append(block(message))  # noqa: E731
+            self.create_subscription(kind, f"diagnosis/{topic}", take, SAID)
+        everybody = (*names, *others)
+        self.clients_of = {name: self.create_client(ListParameters, f"{name}/list_parameters") for name in everybody}
         self.answers: dict[str, Future] = {}
         self.resume_service = self.create_client(Trigger, "replay/resume")
 
@@ -89,7 +97,7 @@ class Watch(Node):
         self.create_subscription(kind, f"{name}/{topic}", lambda message: followed.add(topic, message), STREAM)
 
     def absent(self, names: Sequence[str]) -> list[str]:
-        """Estimators of these that have not answered yet.
+        """Nodes of these that have not answered yet.
 
         Who answers has found all subscriptions of this node, because they were made before the clients that ask:
         its first message will not be missed.
@@ -104,6 +112,11 @@ class Watch(Node):
         if not self.subscribed:
             self.create_subscription(Samples, "samples", self._on_samples, EVERY_SAMPLE)
             self.subscribed = True
+
+    def new_findings(self) -> list[RankingBlock | MisfitBlock]:
+        """What the diagnosis has said since the last time."""
+        found, self.findings = self.findings, []
+        return found
 
     def _on_samples(self, message: Samples) -> None:
         self.samples.add(message)

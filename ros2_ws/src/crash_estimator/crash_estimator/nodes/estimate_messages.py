@@ -2,12 +2,13 @@
 
 from array import array
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from builtin_interfaces.msg import Time
 from crash_msgs.msg import Event, Forces, Parameters, Residuals
 
-from ..core.estimate import Description, Estimate
+from ..core.estimate import Description, Estimate, ParameterStatus
 
 
 class EstimateMessages:
@@ -18,9 +19,11 @@ class EstimateMessages:
 
     def parameters(self, stamp: Time, run: int, estimates: Sequence[Estimate]) -> Parameters:
         d = self.description
-        message = Parameters(name=list(d.parameters), unit=list(d.parameter_units))
+        message = Parameters(name=[*d.parameters, *d.extra], unit=[*d.parameter_units, *d.extra_units])
         self._head(message, stamp, run, estimates)
-        message.value = _rows(estimates, "parameters")
+        if d.extra:
+            estimates = [_with_extra(estimate) for estimate in estimates]
+        message.value = _rows(estimates, "value" if d.extra else "parameters")
         message.std = _rows(estimates, "std")
         message.status = _bytes(estimates, "status")
         return message
@@ -64,18 +67,20 @@ class EstimateMessages:
 
 def description_from(parameters: Parameters, residuals: Residuals, forces: Forces) -> Description:
     """Names and units from one message of each kind."""
-    bodies = tuple(forces.body)
+    bodies, count = tuple(forces.body), _parameters(parameters.status, len(parameters.name))
     return Description(
         model=parameters.model,
         method=parameters.method,
-        parameters=tuple(parameters.name),
-        parameter_units=tuple(parameters.unit),
+        parameters=tuple(parameters.name[:count]),
+        parameter_units=tuple(parameters.unit[:count]),
         equations=tuple(residuals.name),
         equation_units=tuple(residuals.unit),
         elements=tuple(forces.element),
         between=tuple(_ends(between, bodies) for between in forces.between),
         bodies=bodies,
         masses=tuple(forces.mass),
+        extra=tuple(parameters.name[count:]),
+        extra_units=tuple(parameters.unit[count:]),
     )
 
 
@@ -92,13 +97,16 @@ def estimates_from(
     estimates = []
     for number in sorted(set.intersection(*(set(rows) for rows in by_kind))):
         p, r, f = (rows[number] for rows in by_kind)
+        count = _parameters(p["status"], len(p["status"]))
         estimates.append(
             Estimate(
                 number=number,
                 time_ns=p["time_ns"],
-                parameters=p["value"],
-                covariance=_diagonal(p["std"]),
-                status=p["status"],
+                parameters=p["value"][:count],
+                covariance=_diagonal(p["std"][:count]),
+                status=p["status"][:count],
+                extra=tuple(p["value"][count:].tolist()),
+                extra_std=tuple(p["std"][count:].tolist()),
                 innovation_covariance=_diagonal(r["innovation_std"]),
                 **{field: r[field] for field in ("measured", "predicted", "innovation", "residual", "residual_std")},
                 **{field: f[field] for field in ("crush", "rate", "force", "force_std", "state")},
@@ -123,6 +131,28 @@ def _samples(message: Parameters | Residuals | Forces) -> Iterator[tuple[int, di
     tables = {field: np.asarray(getattr(message, field)).reshape(n, -1) for field in FIELDS[type(message)]}
     for k in range(n):
         yield message.number + k, {"time_ns": message.time_ns[k]} | {field: rows[k] for field, rows in tables.items()}
+
+
+class _Row(NamedTuple):
+    """Parameters and what the method knows besides, as they travel."""
+
+    value: np.ndarray
+    std: np.ndarray
+    status: np.ndarray
+
+
+def _with_extra(estimate: Estimate) -> _Row:
+    besides = np.full(len(estimate.extra), ParameterStatus.METHOD, dtype=np.uint8)
+    return _Row(
+        np.concatenate([estimate.parameters, estimate.extra]),
+        np.concatenate([estimate.std, estimate.extra_std]),
+        np.concatenate([estimate.status, besides]),
+    )
+
+
+def _parameters(status: Sequence[int], width: int) -> int:
+    """How many of a sample's values are parameters of the model; the rest is of the method."""
+    return width - int(np.count_nonzero(np.asarray(status[:width]) == ParameterStatus.METHOD))
 
 
 def _diagonal(std: np.ndarray) -> np.ndarray:

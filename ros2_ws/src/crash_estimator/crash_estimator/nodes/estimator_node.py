@@ -39,6 +39,8 @@ class EstimatorNode(Node):
         model = self._declared("model", "", f"a .yaml file, or one of {', '.join(ready_models())}")
         settings = self._declared("settings", [""], "settings of the method, such as forgetting=0.98")
         self.settings = parse_settings([pair for pair in settings if pair])
+        if self._declared("effective_mass", False, "find the masses that go with the accelerometers first"):
+            self.settings["effective_mass"] = True
         if not model:
             raise ModelError(f"parameter model is not set: give a .yaml file, or one of {', '.join(ready_models())}")
         self.structure = load_model(model)

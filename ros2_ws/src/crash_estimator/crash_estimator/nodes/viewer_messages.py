@@ -1,9 +1,11 @@
 """crash_msgs -> the viewer's blocks: the one file of the viewer that knows both worlds."""
 
 import numpy as np
-from crash_msgs.msg import Event, Forces, Parameters, Residuals, TestInfo
+from crash_msgs.msg import Event, Forces, Misfit, Parameters, RankedEffect, Ranking, Residuals, TestInfo
 
 from ..viewer.blocks import EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock
+from ..viewer.findings import Candidate, MisfitBlock, RankingBlock, RevisionBlock, Window
+from .diagnosis_messages import FINAL
 
 
 def test_block(message: TestInfo) -> TestBlock:
@@ -34,8 +36,8 @@ def force_block(estimator: str, message: Forces) -> ForceBlock:
         tuple(message.between),
         bodies,
         np.asarray(message.mass),
-        **_tables(message, len(elements), ("crush", "force", "state")),
-        **_tables(message, len(bodies), ("velocity", "acceleration")),
+        **_tables(message, len(elements), ("crush", "force", "state", "rate")),
+        **_tables(message, len(bodies), ("velocity", "acceleration", "displacement")),
     )
 
 
@@ -50,6 +52,59 @@ BLOCK_OF = {
     "events": (Event, event_block),
 }
 """An estimator's topic -> its message type and what makes a block of it."""
+
+
+def ranking_block(message: Ranking) -> RankingBlock:
+    return RankingBlock(
+        message.run,
+        message.number,
+        message.time,
+        message.final,
+        message.model,
+        message.verdict,
+        tuple(_candidate(one) for one in message.ranking),
+        message.rms_before,
+        message.rms_after,
+        message.noise_floor,
+        message.text,
+        message.revision,
+        tuple(message.found),
+        message.white_before,
+        message.white_after,
+        message.free_run_before,
+        message.free_run_after,
+    )
+
+
+def _candidate(one: RankedEffect) -> Candidate:
+    numbers = (one.coefficient, one.std, one.unit, one.evidence, one.explained)
+    return Candidate(one.effect, one.target, *numbers, one.identifiable, tuple(one.confounded_with))
+
+
+def misfit_block(message: Misfit) -> MisfitBlock:
+    windows = (Window(one.start, one.end, one.body, one.state, one.rms) for one in message.windows)
+    return MisfitBlock(message.run, message.number, tuple(windows))
+
+
+def revision_block(message: Residuals) -> RevisionBlock:
+    return RevisionBlock(
+        message.run,
+        message.number,
+        np.asarray(message.time_ns, dtype=np.int64),
+        message.model,
+        message.method == FINAL,
+        tuple(message.name),
+        tuple(message.unit),
+        **_tables(message, len(message.name), ("measured", "predicted", "residual", "residual_std")),
+    )
+
+
+FINDING_OF = {
+    "diagnosis/ranking": (Ranking, ranking_block),
+    "diagnosis/misfit": (Misfit, misfit_block),
+    "diagnosis/revisions": (Residuals, revision_block),
+}
+"""A topic of the diagnosis -> its message type and what makes a finding of it."""
 
 
 def _head(estimator: str, message: Parameters | Residuals | Forces) -> tuple:

@@ -1,15 +1,15 @@
 """`viewer`: shows what the estimators say in Rerun, live, and writes it to a .rrd file.
 
-Subscribes to `test`, `replay_state` and each estimator's `parameters`, `residuals`, `forces` and `events`. Callbacks
-only queue what comes; decoding, drawing and waiting for a slow screen happen in the recorder's own thread.
+Subscribes to `test`, `replay_state`, each estimator's `parameters`, `residuals`, `forces` and `events`, and the
+diagnosis' `ranking`, `misfit` and `revisions`. Callbacks only queue what comes; decoding, drawing and waiting for a slow screen happen in the recorder's own thread.
 """
 
 import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Hashable
-from functools import partial
+from collections.abc import Callable, Hashable, Sequence
+from functools import cache, partial
 
 import rclpy
 from crash_msgs.msg import ReplayState, Samples, TestInfo
@@ -22,13 +22,15 @@ from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
-from crash_replay.qos import LATCHED, STREAM
+from crash_replay.qos import LATCHED, SAID, STREAM
 from crash_replay.ros_runtime import acknowledge_promptly, spin
 
+from ..core.structure import Structure
+from ..model_file import load_model, ready_models
 from ..viewer.native import has_display, open_viewer
 from ..viewer.recorder import Recorder
 from ..viewer.sinks import Sinks
-from .viewer_messages import BLOCK_OF, test_block
+from .viewer_messages import BLOCK_OF, FINDING_OF, test_block
 
 QUIET = 3.0
 """s without a message after which a finished replay counts as shown, though samples are missing."""
@@ -43,6 +45,7 @@ class ViewerNode(Node):
         say = self.get_logger().info
         names = self._declared("estimators", [""], "names of estimators; empty: all there are")
         self.estimators = [name for name in names if name]
+        models = self._declared("models", [""], "files of models that are not ready ones, for the validation at the end")
         port = self._declared("port", 9876, "of the gRPC server on 127.0.0.1 that viewers connect to")
         rrd = self._declared("rrd", "crash.rrd", "file that the recording is written to; empty: none")
         memory = self._declared("memory_limit", "1GiB", "what the server keeps for viewers that come late")
@@ -50,7 +53,9 @@ class ViewerNode(Node):
         self.exits = self._declared("exit_when_finished", False, "end with the replay")
         sinks = Sinks(port, rrd, memory)
         os.nice(10)  # on a busy machine the estimators go first, the picture comes later
-        self.recorder = Recorder(sinks, tuple(self.estimators), say=self.get_logger().warning)
+        known = cache(partial(structure_named, [path for path in models if path]))
+        warn = self.get_logger().warning
+        self.recorder = Recorder(sinks, tuple(self.estimators), say=warn, structure_of=known)
         if sinks.port != port:
             say(f"port {port} is in use, taking {sinks.port}")
         self.window: subprocess.Popen | None = None
@@ -71,6 +76,9 @@ class ViewerNode(Node):
         self.heard_since = time.monotonic()
         self.create_subscription(TestInfo, "test", self._on_test, LATCHED)
         self.create_subscription(ReplayState, "replay_state", self._on_state, LATCHED)
+        for topic, (kind, make) in FINDING_OF.items():
+            queue = partial(self._queue, kind, make, None)
+            self.create_subscription(kind, topic, queue, SAID, raw=True)
         for name in self.estimators:
             self._follow(name)
         self.create_timer(0.1, self._look_around)
@@ -81,11 +89,11 @@ class ViewerNode(Node):
     def _follow(self, name: str) -> None:
         self.followed.add(name)
         for topic, (kind, make) in BLOCK_OF.items():
-            queue = partial(self._queue, name, kind, make, None if topic == "events" else (name, topic))
+            queue = partial(self._queue, kind, partial(make, name), None if topic == "events" else (name, topic))
             self.inputs.append(self.create_subscription(kind, f"{name}/{topic}", queue, STREAM, raw=True))
 
-    def _queue(self, name: str, kind: type, make: Callable, stream: Hashable, raw: bytes) -> None:
-        self.recorder.put(lambda: make(name, deserialize_message(raw, kind)), stream)
+    def _queue(self, kind: type, make: Callable, stream: Hashable, raw: bytes) -> None:
+        self.recorder.put(lambda: make(deserialize_message(raw, kind)), stream)
 
     def _on_test(self, message: TestInfo) -> None:
         self.recorder.put(partial(test_block, message))
@@ -129,6 +137,15 @@ class ViewerNode(Node):
 
     def _on_first_sample(self, _raw: bytes) -> None:
         self.replay_goes_on = True
+
+
+def structure_named(paths: Sequence[str], name: str) -> Structure | None:
+    """The model of this name, from one of the files or a ready one."""
+    for path in (*paths, ready_models().get(name)):
+        structure = load_model(path) if path else None
+        if structure and structure.name == name:
+            return structure
+    return None
 
 
 def main() -> int:

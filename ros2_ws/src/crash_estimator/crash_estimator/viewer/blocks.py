@@ -78,8 +78,10 @@ class ForceBlock(NamedTuple):
     state: np.ndarray  # (n, e) ElementState
     velocity: np.ndarray  # (n, b) m/s
     acceleration: np.ndarray  # (n, b) m/s^2, measured; NaN where it is not
+    rate: np.ndarray  # (n, e) m/s, of crush
+    displacement: np.ndarray  # (n, b) m
 
-    over_time = ("time_ns", "crush", "force", "state", "velocity", "acceleration")
+    over_time = ("time_ns", "crush", "force", "state", "velocity", "acceleration", "rate", "displacement")
 
 
 class EventBlock(NamedTuple):

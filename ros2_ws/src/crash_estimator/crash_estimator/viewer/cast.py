@@ -42,12 +42,14 @@ class Member(NamedTuple):
     between: tuple[tuple[str, str], ...]
     bodies: tuple[str, ...]
     masses: tuple[float | None, ...]  # kg, None where the model gives none (driven, fixed)
+    besides: tuple[tuple[str, str], ...] = ()  # (name, unit) of what the method knows besides the parameters
 
 
 def member(parameters: ParameterBlock, residuals: ResidualBlock, forces: ForceBlock) -> Member:
     """An estimator's names from its first block of each kind."""
-    estimated = (parameters.status[0] != ParameterStatus.KNOWN).tolist()
-    pairs = zip(parameters.name, parameters.unit)
+    status = parameters.status[0]
+    estimated = (~np.isin(status, (ParameterStatus.KNOWN, ParameterStatus.METHOD))).tolist()
+    pairs = list(zip(parameters.name, parameters.unit))
     return Member(
         name=parameters.estimator,
         model=parameters.model,
@@ -58,6 +60,7 @@ def member(parameters: ParameterBlock, residuals: ResidualBlock, forces: ForceBl
         between=tuple(_ends(between, forces.body) for between in forces.between),
         bodies=forces.body,
         masses=tuple(None if np.isnan(mass) else float(mass) for mass in forces.mass),
+        besides=tuple(pair for pair, own in zip(pairs, status == ParameterStatus.METHOD) if own),
     )
 
 
@@ -77,6 +80,10 @@ class Cast:
     test: TestBlock
     span: tuple[float, float]  # s, first and last sample of the recording
     members: tuple[Member, ...] = ()
+    rankings: tuple[int, ...] = ()  # revisions of the model that a ranking of missing effects has come of
+    outputs: tuple[tuple[str, str], ...] = ()  # (name, unit) of what the diagnosis compares
+    judged: tuple[str, ...] = ()  # estimators whose whole pass the validation has judged
+    revisions_whole: bool = False  # every revision has its curve over the whole record
 
     def with_member(self, new: Member) -> "Cast":
         """The same with one more member, or with one replaced: an estimator that was started again."""
@@ -103,6 +110,17 @@ class Cast:
         """The unit on the screen, and the factor from SI; forces among bodies of a few kilograms are in N."""
         heaviest = max((mass or 0.0 for m in self.members for mass in m.masses), default=0.0)
         return shown(si_unit, light=0.0 < heaviest < LIGHT)
+
+    def inputs_of(self, body: str) -> tuple[str, ...]:
+        """Crush and rate of every element at a body: the inputs of its equation."""
+        at = dict.fromkeys(e for m in self.members for e, ends in zip(m.elements, m.between) if body in ends)
+        return tuple(f"{element}.{kind}" for element in at for kind in ("crush", "rate"))
+
+    @property
+    def mass(self) -> float:
+        """kg, of all bodies with a mass in the lightest model; infinite where none has one."""
+        masses = [sum(mass for mass in m.masses if mass) for m in self.members]
+        return min((mass for mass in masses if mass > 0.0), default=np.inf)
 
     @property
     def equations(self) -> tuple[tuple[str, str], ...]:

@@ -11,10 +11,13 @@ import rerun.blueprint as rrb
 from .cast import Cast
 from .curves import framed, parameter_views, residual_views, signal_views
 from .loops import loop_views
+from .method import method_tab
+from .missing import missing_tab
 from .motion import motion_view
 from .pen import TIMELINE
 from .states import event_view, state_view
 from .summary import summary_view
+from .validation import validation_tab
 
 
 def overview(cast: Cast) -> rrb.Container:
@@ -77,10 +80,18 @@ TABS: tuple[Callable[[Cast], rrb.Container], ...] = (
 )
 
 
+def tabs(cast: Cast) -> list[rrb.Container]:
+    """Those that there is something for: what is missing comes first where somebody looks for it."""
+    every = [tab(cast) for tab in TABS] if cast.members else []
+    every += [method_tab(cast)] if any(m.besides for m in cast.members) else []
+    every += [validation_tab(cast)] if cast.judged else []
+    return [missing_tab(cast), *every] if cast.rankings else every
+
+
 def blueprint(cast: Cast, active_tab: int = 0) -> rrb.Blueprint:
     """All tabs, the first one on top; the time cursor follows the newest sample."""
     return rrb.Blueprint(
-        rrb.Tabs(*(tab(cast) for tab in TABS), active_tab=active_tab),
+        rrb.Tabs(*tabs(cast), active_tab=active_tab),
         rrb.TimePanel(timeline=TIMELINE, play_state="following", state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),

@@ -1,13 +1,15 @@
 """One pass over the test: gathers the cast, then lets the show begin."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import rerun as rr
 
 from .blocks import Block, EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock
 from .cast import Cast, Member, member
+from .findings import Finding, RankingBlock
+from .judged import Jury
 from .show import Attempt, Show
 
 PATIENCE = 2.0
@@ -31,18 +33,20 @@ class Pass:
         expected: tuple[str, ...],
         first: bool,
         attempt: Attempt,
+        jury: Jury,
     ):
         """first: of the session; attempt: as in Show."""
         self.recordings = [live, file[0]] if file else [live]
         self.path = file[1] if file else None
         self.expected, self.first, self.attempt = expected, first, attempt
+        self.jury: Jury | None = jury  # None: it has judged
         self.shows: list[Show] = []  # one for each recording
         self.test: TestBlock | None = None
         self.began: float | None = None
         self.ended = False
         self.samples: dict[str, int] = {}  # drawn, by estimator
-        self._waiting: list[Block | EventBlock] = []
-        self._unsaved: list[Block | EventBlock] = []
+        self._waiting: list[Block | EventBlock | Finding] = []
+        self._unsaved: list[Block | EventBlock | Finding] = []
         self._saved_at = 0.0  # monotonic s
         self._heads: dict[str, dict[type, Block]] = {}  # each estimator's newest block of each kind
 
@@ -51,21 +55,23 @@ class Pass:
         for recording in self.recordings:
             recording.send_recording_name(test.id)
 
-    def write(self, items: Iterable[Block | EventBlock], at_once: bool = False) -> None:
+    def write(self, items: Iterable[Block | EventBlock | Finding], at_once: bool = False) -> None:
         """at_once: wait for no other estimator."""
         self._waiting += items
         self.began = self.began or time.monotonic()
         for item in self._waiting:
-            if not isinstance(item, EventBlock):
+            if not isinstance(item, (EventBlock, Finding)):
                 self._heads.setdefault(item.estimator, {})[type(item)] = item
         self._meet(at_once)
         if self.shows:
             names = self.shows[0].cast.names
-            ready = [item for item in self._waiting if item.estimator in names]
-            self._waiting = [item for item in self._waiting if item.estimator not in names]
+            waiting, self._waiting, ready = self._waiting, [], []
+            for item in waiting:
+                on_stage = isinstance(item, Finding) or item.estimator in names
+                (ready if on_stage else self._waiting).append(item)
             self._draw(ready)
 
-    def _draw(self, ready: list[Block | EventBlock]) -> None:
+    def _draw(self, ready: list[Block | EventBlock | Finding]) -> None:
         self.shows[0].write(ready)
         if self.path:
             self._unsaved += ready
@@ -74,6 +80,17 @@ class Pass:
         for item in ready:
             if isinstance(item, ResidualBlock):
                 self.samples[item.estimator] = self.samples.get(item.estimator, 0) + len(item.time_ns)
+            if self.jury and isinstance(item, Block):
+                self.jury.hear(item)
+        if self.jury and self.complete:
+            self._judge()
+
+    def _judge(self) -> None:
+        """Once all have been drawn to the last sample."""
+        jury, self.jury = self.jury, None
+        judged = self.attempt(jury.verdicts)
+        for show in self.shows if judged else ():
+            show.judge(judged)
 
     def _save(self) -> None:
         unsaved, self._unsaved = self._unsaved, []
@@ -118,12 +135,12 @@ class Pass:
         missing = self.test is None or any(name not in present for name in self.expected)
         if not self.shows:
             wait = PATIENCE if missing else 0.0 if self.expected else COURTESY
-            if not present or (time.monotonic() - self.began < wait and not at_once):
+            begin = self._begin(present)
+            if begin is None or (time.monotonic() - self.began < wait and not at_once):
                 return
             order = {name: k for k, name in enumerate(self.expected)}
             present.sort(key=lambda name: (order.get(name, len(order)), name))
-            first = self._heads[present[0]][ResidualBlock]
-            cast = Cast(self.test or UNKNOWN_TEST, self._span(first))
+            cast = Cast(self.test or UNKNOWN_TEST, self._span(*begin))
         else:
             cast = self.shows[0].cast
         for name in present:
@@ -138,8 +155,16 @@ class Pass:
         heads = self._heads[name]
         return member(heads[ParameterBlock], heads[ResidualBlock], heads[ForceBlock])
 
-    def _span(self, block: ResidualBlock) -> tuple[float, float]:
-        """s, the recording's first and last instant, from any block's number."""
+    def _begin(self, present: Sequence[str]) -> tuple[int, float] | None:
+        """(number, s) of any sample: of an estimator's, or of one that the diagnosis speaks of; None where there is none."""
+        if present:
+            block = self._heads[present[0]][ResidualBlock]
+            return block.number, float(block.time_ns[0]) * 1e-9
+        rankings = [item for item in self._waiting if isinstance(item, RankingBlock)]
+        return (rankings[0].number, rankings[0].time) if rankings else None
+
+    def _span(self, number: int, time_: float) -> tuple[float, float]:
+        """s, the recording's first and last instant, from any sample's number and time."""
         test = self.test or UNKNOWN_TEST
-        start = float(block.time_ns[0]) * 1e-9 - block.number * test.sample_period
-        return start, max(start + max(test.samples - 1, 0) * test.sample_period, float(block.time_ns[-1]) * 1e-9)
+        start = time_ - number * test.sample_period
+        return start, max(start + max(test.samples - 1, 0) * test.sample_period, time_)

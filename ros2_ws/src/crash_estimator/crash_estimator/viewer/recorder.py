@@ -6,11 +6,14 @@ from collections import Counter, deque
 from collections.abc import Callable, Hashable
 from typing import NamedTuple
 
+from ..core.structure import Structure
 from .blocks import Block, EventBlock, TestBlock
+from .findings import Finding
+from .judged import Jury
 from .passes import Pass
 from .sinks import Sinks
 
-Item = Block | EventBlock | TestBlock
+Item = Block | EventBlock | Finding | TestBlock
 Make = Callable[[], Item]
 
 PERIOD = 0.05
@@ -34,10 +37,17 @@ class Recorder:
     """Takes the blocks of each estimator in their order and writes them in batches."""
 
     def __init__(
-        self, sinks: Sinks, expected: tuple[str, ...] = (), limit: int = 100_000, say: Callable[[str], None] = print
+        self,
+        sinks: Sinks,
+        expected: tuple[str, ...] = (),
+        limit: int = 100_000,
+        say: Callable[[str], None] = print,
+        structure_of: Callable[[str], Structure | None] = lambda name: None,
     ):
-        """expected: estimators that the layout waits for a little; limit: items in the queue; say: told of trouble."""
+        """expected: estimators that the layout waits for a little; limit: items in the queue; say: told of trouble;
+        structure_of: a model by its name, for the validation; None where it is not known."""
         self.sinks, self.expected, self.limit, self.say = sinks, expected, limit, say
+        self.structure_of = structure_of
         self.dropped = 0
         self.last_put = time.monotonic()
         self._queue: deque[Entry] = deque()
@@ -126,7 +136,7 @@ class Recorder:
         for item in made:
             if isinstance(item, TestBlock):
                 self._meet_test(item)
-        by_run: dict[int, list[Block | EventBlock]] = {}
+        by_run: dict[int, list[Block | EventBlock | Finding]] = {}
         for item in made:
             if item is not None and not isinstance(item, TestBlock):
                 by_run.setdefault(item.run, []).append(item)
@@ -157,7 +167,7 @@ class Recorder:
         """One complete pass in a file is enough: a test that is replayed in a loop must not fill the disk."""
         have_one = any(pass_.path and pass_.complete for pass_ in self._passes.values())
         file = None if have_one else self.sinks.open_file()
-        return Pass(self.sinks.open_live(), file, self.expected, not self._passes, self._guarded)
+        return Pass(self.sinks.open_live(), file, self.expected, not self._passes, self._guarded, Jury(self.structure_of))
 
     def _guarded(self, action: Callable):
         """A block that cannot be drawn is said once and left out; the rest goes on."""

@@ -1,15 +1,20 @@
 """One pass over a recording on the screen: blocks in, Rerun data out."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import rerun as rr
 
+from . import method, validation
 from .blocks import Block, EventBlock, ForceBlock, ParameterBlock, ResidualBlock, join
 from .cast import Cast
 from .curves import Curves
+from .findings import Finding
+from .judged import Judged
 from .layout import blueprint
 from .loops import Loops
+from .missing import Missing, cast_with
 from .motion import Motion
 from .pen import Pen
 from .states import States
@@ -29,7 +34,7 @@ class Show:
         self.recording, self.activate, self.attempt = recording, activate, attempt
         self.pen = Pen(recording)
         self.curves, self.loops, self.motion = Curves(self.pen), Loops(self.pen), Motion(self.pen)
-        self.states, self.summary = States(self.pen), Summary(self.pen)
+        self.states, self.summary, self.missing = States(self.pen), Summary(self.pen), Missing(self.pen)
         self.set_cast(cast)
 
     def set_cast(self, cast: Cast) -> None:
@@ -39,19 +44,28 @@ class Show:
         self.motion.set_cast(cast)
         self.recording.send_blueprint(blueprint(cast), make_active=self.activate)
 
-    def write(self, items: Sequence[Block | EventBlock]) -> None:
-        """What members of the cast say, in the order it came; the more at a time, the cheaper."""
-        blocks = [item for item in items if not isinstance(item, EventBlock)]
+    def write(self, items: Sequence[Block | EventBlock | Finding]) -> None:
+        """What members of the cast and the diagnosis say, in the order it came; the more at a time, the cheaper."""
+        for finding in (item for item in items if isinstance(item, Finding)):
+            self.attempt(lambda finding=finding: self._write_finding(finding))
+        blocks = [item for item in items if not isinstance(item, (EventBlock, Finding))]
         for block in join(blocks):
             self.attempt(lambda block=block: self._write_block(block))
         self.states.write_events(self.cast, [item for item in items if isinstance(item, EventBlock)])
         if blocks:
             self.summary.write(self.cast)
 
+    def _write_finding(self, finding: Finding) -> None:
+        cast = cast_with(self.cast, finding)
+        if cast != self.cast:
+            self.set_cast(cast)
+        self.missing.write(self.cast, finding)
+
     def _write_block(self, block: Block) -> None:
         match block:
             case ParameterBlock():
                 self.curves.write_parameters(self.cast, block)
+                method.write(self.pen, block)
                 self.summary.add_parameters(block)
             case ResidualBlock():
                 self.curves.write_residuals(self.cast, block)
@@ -61,7 +75,13 @@ class Show:
                 self.motion.write(self.cast, block)
                 self.states.write(self.cast, block)
 
+    def judge(self, judged: Mapping[str, Judged]) -> None:
+        """What the validation says of each estimator: a tab of its own."""
+        self.set_cast(replace(self.cast, judged=tuple(judged)))
+        validation.write(self.pen, self.cast, judged)
+
     def finish(self) -> None:
         """The last sample has been written."""
         self.motion.finish(self.cast)
+        self.missing.finish()
         self.summary.write(self.cast)

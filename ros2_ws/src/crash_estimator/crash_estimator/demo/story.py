@@ -1,0 +1,98 @@
+"""The search for what is missing, told on the terminal: where the model fails, what it lacks, how the error falls."""
+
+from collections.abc import Sequence
+
+from ..viewer.findings import FOUND, Candidate, MisfitBlock, RankingBlock, Window
+from ..viewer.summary import with_std
+from ..viewer.units import shown
+
+SURE = 3
+"""Rankings in a row that a candidate leads before it is worth a line."""
+SIGNS = 2
+"""Lines of this kind."""
+WINDOWS = 2
+
+G = shown("m/s^2")
+
+
+class Story:
+    """Takes what the diagnosis says, in its order, and gives the lines that are worth telling."""
+
+    def __init__(self) -> None:
+        self.leader, self.led, self.signs = "", 0, 0
+        self.finals: dict[int, RankingBlock] = {}  # by revision
+        self.windows: tuple[Window, ...] = ()
+
+    @property
+    def complete(self) -> bool:
+        """Whether the last answer that is to be expected has come: with what was found added, if anything was."""
+        return bool(self.finals) and (not self.finals[min(self.finals)].found or len(self.finals) > 1)
+
+    def misfit(self, block: MisfitBlock) -> list[str]:
+        """Where the model as it was given fails: told with the first answer on all samples."""
+        first = len(self.finals) == 1 and not self.windows
+        if not first:
+            return []
+        self.windows = block.windows
+        worst = sorted(block.windows, key=lambda w: -w.rms * (w.end - w.start) ** 0.5)[:WINDOWS]
+        lines = [_where(window) for window in sorted(worst, key=lambda w: w.start)]
+        return [f"where it fails: {'; '.join(lines)}"] if lines else []
+
+    def ranking(self, block: RankingBlock) -> list[str]:
+        if not block.final:
+            return self._sign(block)
+        if block.revision in self.finals:
+            return []
+        self.finals[block.revision] = block
+        return _answer(block) if len(self.finals) == 1 else self._after(block)
+
+    def _sign(self, block: RankingBlock) -> list[str]:
+        best = block.ranking[0] if block.ranking and block.verdict == "effect_missing" else None
+        name = best.name if best else ""
+        self.led = self.led + 1 if name == self.leader else 1
+        self.leader = name
+        if not best or self.led != SURE or self.signs == SIGNS:
+            return []
+        self.signs += 1
+        return [f"{1e3 * block.time:5.1f} ms: {name} would explain {best.explained:.0%} of the misfit so far"]
+
+    def _after(self, block: RankingBlock) -> list[str]:
+        first = self.finals[min(self.finals)]
+        return [_fall(first, block), f"verdict with it: {block.verdict.replace('_', ' ')}{_rest(block)}"]
+
+
+def _where(window: Window) -> str:
+    moment = f"{1e3 * window.start:.1f} to {1e3 * window.end:.1f} ms"
+    return f"{window.body}, {window.state}, {moment}: RMS {G.factor * window.rms:.3g} {G.unit}"
+
+
+def _answer(block: RankingBlock) -> list[str]:
+    errors = f"error {G.factor * block.rms_before:.3g} {G.unit}, noise floor {G.factor * block.noise_floor:.3g}"
+    lines = [f"all samples: {block.verdict.replace('_', ' ')}; {errors}"]
+    counting = [one for one in block.ranking if one.evidence >= FOUND]
+    if counting:
+        lines.append(f"what it lacks: {_named(counting[0])}")
+        lines += [f"not told from it here: {_listed(counting[0].confounded_with)}"] * bool(counting[0].confounded_with)
+    return lines
+
+
+def _named(one: Candidate) -> str:
+    value = f"{with_std(one.coefficient, one.std)} {one.unit}"
+    return f"{one.name}, {value}; evidence {one.evidence:.0f} nats, explains {one.explained:.0%}"
+
+
+def _fall(before: RankingBlock, after: RankingBlock) -> str:
+    fit, run = (
+        f"{G.factor * a:.3g} -> {G.factor * b:.3g} {G.unit}"
+        for a, b in ((before.rms_before, after.rms_before), (before.free_run_before, after.free_run_before))
+    )
+    left = "white" if after.white_before else "not white"
+    return f"the error falls: {fit} (simulated freely {run}), noise floor {G.factor * after.noise_floor:.3g}; what is left is {left}"
+
+
+def _rest(block: RankingBlock) -> str:
+    return f", it also lacks {_listed(block.found)}" if block.found else ""
+
+
+def _listed(names: Sequence[str], most: int = 3) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -1,0 +1,160 @@
+"""The diagnosis in a process of its own, so that the node's callbacks never wait for it. No ROS here."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from multiprocessing.connection import Connection, Pipe
+from typing import NamedTuple
+
+import numpy as np
+
+from crash_replay.bag import read_bag
+from crash_replay.recording import Channel, Recording, RecordingError, Test
+
+from ..core.diagnosis.diagnosis import diagnose
+from ..core.diagnosis.live import LiveDiagnosis, LiveState
+from ..core.diagnosis.live_answer import LiveAnswer, final_answer
+from ..core.effects import EFFECTS
+from ..core.effects.base import Effect
+from ..core.effects.user import load_effects
+from ..core.structure import ModelError, Structure
+
+NICENESS = 10
+"""On a busy machine the estimators go first, the ranking comes later."""
+
+
+TRY_OUT = 200
+"""Samples of noise, at 10 kHz."""
+
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
+"""Its matrices are small: more threads wait for each other, twice as long on an idle machine, ten times on a busy one."""
+
+
+class Task(NamedTuple):
+    structure: Structure
+    recording: Recording  # as far as the samples go
+    final: bool  # that was the last one: the offline answer
+
+
+class Answerer:
+    """Answers tasks in this process, one after the other; what an update leaves serves the next one."""
+
+    def __init__(self, effects: Mapping[str, Effect], others: Sequence[Recording] = ()):
+        """others: recordings of the same structure that are used with the replayed one."""
+        self.effects, self.others = effects, others
+        self.live: LiveDiagnosis | None = None
+        self.state = LiveState()
+        self.samples = 0
+
+    def answer(self, task: Task) -> LiveAnswer | None:
+        """None where the samples are too few. Raises ModelError or RecordingError."""
+        structure, recording = task.structure, task.recording
+        if task.final:
+            return final_answer(diagnose(structure, [recording, *self.others], self.effects))
+        live = self.live
+        if live is None or live.structure != structure or live.test != recording.test or len(recording) < self.samples:
+            live = LiveDiagnosis(structure, recording.test, self.others, self.effects)
+            self.live, self.state = live, live.init()
+        self.samples = len(recording)
+        self.state, answer = live.update(self.state, recording)
+        return answer
+
+    def try_out(self, structure: Structure) -> None:
+        """An update on noise: it gets the compiled code ready."""
+        channels = {name: Channel(name, quantity) for _, name, quantity in structure.channels()}
+        values = np.random.default_rng(0).normal(size=(TRY_OUT, len(channels)))
+        time_ns = np.arange(-TRY_OUT // 2, TRY_OUT // 2) * 100_000
+        recording = Recording(Test("try-out", tuple(channels.values())), time_ns, values)
+        with suppress(ModelError, RecordingError, np.linalg.LinAlgError):  # an effect may need a channel of the test
+            self.answer(Task(structure, recording, final=False))
+
+
+class WorkerError(RuntimeError):
+    """The process cannot even begin; the message is one line."""
+
+
+class Reply(NamedTuple):
+    answer: LiveAnswer | None
+    error: str = ""  # one line
+
+
+class Worker:
+    """An Answerer in another process, which is asked without waiting; one task at a time."""
+
+    def __init__(self, structure: Structure, effects_file: str = "", bags: Sequence[str] = ()):
+        """structure: to get ready with; effects_file: a user's own effects; bags: other recordings of the same structure."""
+        self.setup = structure, effects_file, tuple(bags)
+        self._start()
+
+    def ask(self, task: Task) -> None:
+        """Only while it is not busy: then it takes the task from the pipe as fast as it is put there."""
+        self.busy, self.wanted, self.long = True, True, task.final
+        self._pipe.send(task)
+
+    def reply(self) -> Reply | None:
+        """What has come for the last task since the last look. Raises WorkerError."""
+        if not self.busy or not self._pipe.poll():
+            return None
+        try:
+            content = self._pipe.recv()
+        except (EOFError, OSError):
+            return self._ended()
+        wanted, self.busy, self.wanted, self.ready = self.wanted, False, False, True
+        return content if wanted else None
+
+    def drop(self) -> None:
+        """Nobody waits for the reply any more: an update is let finish, a final answer, which takes seconds, is not."""
+        self.wanted = False
+        if self.busy and self.long:
+            self.close()
+            self._start()
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        self._pipe.close()
+
+    def _ended(self) -> Reply:
+        status = self.process.wait()
+        self._pipe.close()
+        if not self.ready:
+            raise WorkerError(f"the process of the diagnosis could not begin, its status is {status}")
+        self._start()
+        return Reply(None, f"the process of the diagnosis ended with status {status}, a new one is started")
+
+    def _start(self) -> None:
+        self._pipe, its = Pipe()
+        # run as __main__ it would send classes of that name
+        command = [sys.executable, "-c", f"from {__name__} import main; main({its.fileno()})"]
+        environment = ONE_THREAD | os.environ
+        self.process = subprocess.Popen(command, pass_fds=[its.fileno()], stdin=subprocess.DEVNULL, env=environment)
+        its.close()
+        self._pipe.send(self.setup)
+        self.busy, self.wanted, self.long = True, False, False  # until it says that it is there
+        self.ready = False
+
+
+def main(fd: int) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the node, which ends this
+    os.nice(NICENESS)
+    with Connection(fd) as node:
+        structure, effects_file, bags = node.recv()
+        effects = EFFECTS | (load_effects(effects_file) if effects_file else {})
+        Answerer(effects).try_out(structure)
+        answerer = Answerer(effects, [read_bag(bag) for bag in bags])
+        node.send(Reply(None))
+        with suppress(EOFError, BrokenPipeError):  # the node has gone
+            while True:
+                node.send(_reply(answerer, node.recv()))
+
+
+def _reply(answerer: Answerer, task: Task) -> Reply:
+    try:
+        return Reply(answerer.answer(task))
+    except (ModelError, RecordingError) as error:
+        return Reply(None, " ".join(str(error).split()))
+    except np.linalg.LinAlgError as error:
+        return Reply(None, f"the fit broke down ({error})" if task.final else "")

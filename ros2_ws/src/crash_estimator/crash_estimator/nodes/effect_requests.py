@@ -1,0 +1,53 @@
+"""Requests to add an effect: how an effect's constants travel as text."""
+
+from collections.abc import Mapping
+
+from crash_msgs.srv import AddEffect
+
+from crash_replay.recording import Test
+
+from ..core.effects import EFFECTS
+from ..core.effects.base import Effect
+from ..core.effects.change import add_effect
+from ..core.structure import EffectSpec, ModelError, Structure
+
+WORDS = ("host", "touches", "taken_from", "variant")
+"""Options that are names; any other is a number."""
+
+
+def request_of(spec: EffectSpec) -> AddEffect.Request:
+    """The request that adds just this effect; numbers keep all their digits."""
+    numbers = {"coefficient": spec.coefficient} if spec.coefficient is not None else {}
+    options = [f"{name}={float(value)!r}" for name, value in (numbers | dict(spec.shape)).items()]
+    options += [f"{name}={value}" for name in WORDS if (value := getattr(spec, name))]
+    return AddEffect.Request(effect=spec.type, target=spec.target, options=options)
+
+
+def with_effect(
+    structure: Structure,
+    request: AddEffect.Request,
+    effects: Mapping[str, Effect] = EFFECTS,
+    test: Test | None = None,
+) -> Structure:
+    """The structure with the effect that a request asks for; raises ModelError with one line."""
+    words, numbers = _options(request)
+    coefficient = numbers.pop("coefficient", None)
+    return add_effect(structure, request.effect, request.target, effects, test, coefficient, numbers, **words)
+
+
+def _options(request: AddEffect.Request) -> tuple[dict[str, str], dict[str, float]]:
+    words: dict[str, str] = {}
+    numbers: dict[str, float] = {}
+    for option in request.options:
+        name, _, text = option.partition("=")
+        if name in WORDS:
+            words[name] = text
+            continue
+        try:
+            numbers[name] = float(text)
+        except ValueError:
+            raise ModelError(
+                f"effect {request.effect} on {request.target}: an option is written coefficient=1810, host=car or "
+                f"SHAPE_CONSTANT=NUMBER, got {option!r}"
+            ) from None
+    return words, numbers

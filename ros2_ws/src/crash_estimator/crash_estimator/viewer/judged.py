@@ -1,0 +1,125 @@
+"""Blocks -> estimates again, and what the validation says of them (thesis 3.7). Neither ROS nor Rerun here."""
+
+from collections.abc import Callable, Mapping
+from functools import reduce
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.estimate import Description, Estimate, ParameterStatus
+from ..core.free_run import Comparison, FreeRun, compare, free_run
+from ..core.structure import ModelError, Structure
+from ..core.validation import Validation, validate
+from .blocks import Block, ForceBlock, ParameterBlock, ResidualBlock, join
+
+MOST = 20_000
+"""Samples; of a longer recording nothing is judged here: a viewer must not work for minutes."""
+
+
+class Judged(NamedTuple):
+    """One estimator's whole pass."""
+
+    validation: Validation
+    simulated: FreeRun | None  # None: it cannot be simulated
+    comparisons: list[Comparison]
+
+
+class Jury:
+    """Keeps what the estimators say in one pass, and judges it when it is complete."""
+
+    def __init__(self, structure_of: Callable[[str], Structure | None]):
+        """structure_of: a model by its name; None where it is not known."""
+        self.structure_of = structure_of
+        self.said: dict[str, list[Block]] = {}
+        self.samples: dict[str, int] = {}
+
+    def hear(self, block: Block) -> None:
+        kept = self.said.setdefault(block.estimator, [])
+        if isinstance(block, ResidualBlock):
+            self.samples[block.estimator] = self.samples.get(block.estimator, 0) + len(block.time_ns)
+        if self.samples.get(block.estimator, 0) <= MOST:
+            kept.append(block)
+        else:
+            kept.clear()
+
+    def verdicts(self) -> dict[str, Judged]:
+        """By estimator; those that cannot be judged are left out."""
+        found = {}
+        for name, blocks in self.said.items():
+            structure = self.structure_of(blocks[0].model) if blocks else None
+            judged = judge(structure, blocks) if structure else None
+            if judged:
+                found[name] = judged
+        return found
+
+
+def judge(structure: Structure, blocks: list[Block]) -> Judged | None:
+    """All blocks of one estimator in one pass; None where they do not belong to the structure."""
+    kinds: Mapping[type, Block] = {type(block): block for block in join(blocks)}
+    if kinds.keys() != {ParameterBlock, ResidualBlock, ForceBlock}:
+        return None
+    parameters, residuals, forces = kinds[ParameterBlock], kinds[ResidualBlock], kinds[ForceBlock]
+    fits = tuple(element.name for element in structure.elements) == forces.element
+    if not fits:
+        return None
+    description = describe(parameters, residuals, forces)
+    estimates = estimates_of(parameters, residuals, forces)
+    judged = validate(structure, description, estimates)
+    try:
+        simulated = free_run(structure, description, estimates)
+    except (ModelError, np.linalg.LinAlgError, FloatingPointError):
+        return Judged(judged, None, [])
+    return Judged(judged, simulated, compare(structure, description, simulated))
+
+
+def describe(parameters: ParameterBlock, residuals: ResidualBlock, forces: ForceBlock) -> Description:
+    own = _own(parameters)
+    return Description(
+        model=parameters.model,
+        method=parameters.method,
+        parameters=parameters.name[:own],
+        parameter_units=parameters.unit[:own],
+        equations=residuals.name,
+        equation_units=residuals.unit,
+        elements=forces.element,
+        between=tuple(tuple(ends.split("-", 1)) for ends in forces.between),
+        bodies=forces.body,
+        masses=tuple(forces.mass),
+    )
+
+
+def estimates_of(parameters: ParameterBlock, residuals: ResidualBlock, forces: ForceBlock) -> list[Estimate]:
+    """Samples that all three tell of; of the covariances only the diagonals are known."""
+    common = reduce(np.intersect1d, (parameters.time_ns, residuals.time_ns, forces.time_ns))
+    own = _own(parameters)
+    p, r, f = (np.searchsorted(block.time_ns, common) for block in (parameters, residuals, forces))
+    return [
+        Estimate(
+            number=parameters.number + int(i),
+            time_ns=int(time_ns),
+            parameters=parameters.value[i, :own],
+            covariance=np.diag(parameters.std[i, :own] ** 2),
+            status=parameters.status[i, :own],
+            measured=residuals.measured[j],
+            predicted=residuals.predicted[j],
+            innovation=residuals.innovation[j],
+            innovation_covariance=np.diag(residuals.innovation_std[j] ** 2),
+            residual=residuals.residual[j],
+            residual_std=residuals.residual_std[j],
+            crush=forces.crush[k],
+            rate=forces.rate[k],
+            force=forces.force[k],
+            force_std=np.full_like(forces.force[k], np.nan),
+            state=forces.state[k],
+            displacement=forces.displacement[k],
+            velocity=forces.velocity[k],
+            acceleration=forces.acceleration[k],
+            events=(),
+        )
+        for time_ns, i, j, k in zip(common, p, r, f)
+    ]
+
+
+def _own(parameters: ParameterBlock) -> int:
+    """How many are parameters of the model; what the method knows besides comes after them."""
+    return int(np.count_nonzero(parameters.status[0] != ParameterStatus.METHOD))
