@@ -135,7 +135,6 @@ def test_rosbags_reads_it_and_the_test_is_latched(tmp_path):
     assert other.durability == QosDurability.VOLATILE and other.reliability == QosReliability.RELIABLE
 
 
-@pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")  # of a parser that rclpy imports
 def test_ros_itself_decodes_every_message(tmp_path):
     serialization = pytest.importorskip("rclpy.serialization")
     messages = pytest.importorskip("crash_msgs.msg")

@@ -13,7 +13,7 @@ from crash_estimator.model_file import load_model
 from crash_replay.recording import Recording
 from crash_replay.synthetic.recordings import SCENARIOS
 
-ARRAYS = [name for name in Estimate._fields if name not in ("number", "time_ns", "events", "extra")]
+ARRAYS = [name for name in Estimate._fields if name not in ("number", "time_ns", "events", "extra", "extra_std")]
 CASES = [
     ("side_dummy_padded", "side_dummy"),
     ("frontal_engine_cab", "frontal_engine_cab"),

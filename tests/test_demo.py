@@ -18,8 +18,6 @@ from crash_estimator.model_file import load_model
 from crash_estimator.tables import error_table, parameter_table
 from crash_replay.bag import read_bag
 
-pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")  # of a parser that rclpy imports
-
 ESTIMATORS = ("mrls", "constrained_kalman")
 FAST, SLOW = ("--rate", "0.1"), ("--rate", "0.02")
 

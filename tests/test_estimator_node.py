@@ -19,8 +19,6 @@ from crash_replay.bag import read_bag
 from crash_replay.recording import Recording, Test
 from crash_replay.ros_messages import stamp_ns
 
-pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")  # of a parser that rclpy imports
-
 BAGS = Path(__file__).resolve().parent.parent / "bags"
 MODEL = """
 name: oscillator

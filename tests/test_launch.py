@@ -10,8 +10,6 @@ import pytest
 from crash_estimator.core.methods import METHODS
 from crash_replay.replay_parameters import PARAMETERS
 
-pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")  # of a parser that rclpy imports
-
 PACKAGES = Path(__file__).resolve().parent.parent / "ros2_ws/src"
 LAUNCH_FILE = PACKAGES / "crash_estimator/launch/live.launch.py"
 

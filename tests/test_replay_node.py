@@ -23,9 +23,6 @@ from crash_replay.recording import Recording
 from crash_replay.replay_topics import ReplayTopics
 from crash_replay.ros_messages import channel_from_msg, channel_type, stamp_ns, test_to_msg
 
-# a parser that rclpy imports
-pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")
-
 RECORDING = some_recording()  # 40 samples at 1 kHz, the impact at number 10
 FINISHED = r"finished: 40 samples sent in 40 messages, rate [\d.]+ of 1 asked for, at worst [\d.]+ ms late\n"
 

@@ -25,9 +25,6 @@ from crash_replay.ros_messages import (
     test_to_msg,
 )
 
-# a parser that rclpy imports
-pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")
-
 RECORDING = some_recording()
 ZERO = time_zero_ns(RECORDING)
 

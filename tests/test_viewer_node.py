@@ -24,8 +24,6 @@ from crash_estimator.viewer.blocks import Block, ForceBlock, ParameterBlock, Res
 from crash_replay.qos import LATCHED, STREAM
 from crash_replay.ros_runtime import acknowledge_promptly
 
-pytestmark = pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")  # of a parser that rclpy imports
-
 NAMES = ("mrls", "ckf")
 TOPIC_OF = {ParameterBlock: "parameters", ResidualBlock: "residuals", ForceBlock: "forces"}
 
