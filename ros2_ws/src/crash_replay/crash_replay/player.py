@@ -95,6 +95,19 @@ class Player:
         check_rate(rate)
         return replace(self, rate=rate, anchor=self._reached(now))
 
+    def set_loop(self, loop: bool, now: float) -> Self:
+        """Whether the first sample follows the last."""
+        return replace(self, loop=loop)
+
+    def set_window(self, first: int, end: int, now: float) -> Self:
+        """Play the samples first to end - 1 only; where the next is none of them, go to the first, as a new run."""
+        changed = replace(self, first=first, end=end, pending=0)
+        if self.mode == Mode.WAITING:
+            return replace(changed, next=first)
+        if self.mode == Mode.FINISHED:
+            return replace(changed, next=end)
+        return changed if first <= self.next < end else changed._at(first, now, self.mode)
+
     def seek(self, time_ns: int, now: float) -> Self:
         """Make the first sample at or after a time the next one, as a new run; playing or paused as before."""
         number = int(np.searchsorted(self.time_ns, time_ns))

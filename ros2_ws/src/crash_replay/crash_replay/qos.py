@@ -24,3 +24,11 @@ EVERY_SAMPLE = QoSProfile(
     history=HistoryPolicy.KEEP_ALL,
 )
 """To subscribe to `samples` with: replay then waits for a subscriber that is slow. Others lose what overruns them."""
+
+SAID = QoSProfile(
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    history=HistoryPolicy.KEEP_LAST,
+    depth=200,
+)
+"""A diagnosis: few messages, which a late joiner gets as well."""

@@ -1,0 +1,91 @@
+"""Lock-step: the next samples go out when every listener has answered the last ones. No ROS here.
+
+A listener is a node that publishes answers. One that comes late owes answers from the next samples on; one
+that dies, or does not answer for long, is gone on without, so that the replay never waits for ever.
+"""
+
+import time
+from collections.abc import Callable
+from threading import Condition
+from typing import NamedTuple
+
+LOOK_AFTER = 0.2
+"""Seconds without an answer after which to look whether the listener is still there."""
+
+
+class Answered(NamedTuple):
+    """What a listener has told."""
+
+    run: int
+    number: int  # of the last sample it has answered
+    missed: int  # samples it did not get, in all
+
+
+class Lockstep:
+    """`expect` and `has_room` are of the thread that sends, `answer` comes from another."""
+
+    def __init__(self, listeners: Callable[[], set[str]], warn: Callable[[str], None], patience: float):
+        """listeners: names of those there are now; patience: s to wait for one that is there but does not answer."""
+        self.listeners, self.warn, self.patience = listeners, warn, patience
+        self.changed = Condition()
+        self.known: set[str] = set()
+        self.dropped: set[str] = set()  # there, but silent
+        self.owing: set[str] = set()  # those whose answer to the last samples is still to come
+        self.answers: dict[str, Answered] = {}
+        self.last = (0, -1)  # run and number of the last sample sent
+        self.since = self.look_at = 0.0
+
+    def find_listeners(self) -> None:
+        """Look who is there now: who came owes answers from the next samples on, who went owes none."""
+        there = self.listeners()
+        with self.changed:
+            gone = self.known - there
+            self.known = there
+            self.owing -= gone
+            self.dropped &= there
+        for name in sorted(gone):
+            self.warn(f"{name} has gone, the replay no longer waits for it")
+
+    def expect(self, run: int, number: int) -> None:
+        """Samples up to `number` are about to be sent."""
+        with self.changed:
+            self.last, self.owing = (run, number), self.known - self.dropped
+        self.since = time.perf_counter()
+        self.look_at = self.since + LOOK_AFTER
+
+    def answer(self, name: str, answered: Answered) -> None:
+        """A listener has published everything up to a sample."""
+        with self.changed:
+            self.answers[name] = answered
+            self.dropped.discard(name)
+            if (answered.run, answered.number) >= self.last:
+                self.owing.discard(name)
+                if not self.owing:
+                    self.changed.notify_all()
+
+    def has_room(self, now: float) -> bool:
+        """Whether nobody owes an answer at the wall time `now`."""
+        if self.owing and now > self.look_at:
+            self.look_at = now + LOOK_AFTER
+            self.find_listeners()
+            if self.owing and now - self.since > self.patience:
+                self._drop()
+        return not self.owing
+
+    def wait(self, seconds: float) -> None:
+        """Wait until all have answered, at most so long."""
+        with self.changed:
+            if self.owing:
+                self.changed.wait(seconds)
+
+    def _drop(self) -> None:
+        with self.changed:
+            silent = sorted(self.owing)
+            self.dropped |= self.owing
+            self.owing = set()
+        run, number = self.last
+        for name in silent:
+            self.warn(
+                f"{name} has not answered sample {number} of run {run} for {self.patience:g} s: going on without it "
+                "until it answers again"
+            )
