@@ -1,6 +1,7 @@
 """The report on one recording: the thesis's tables and figures in one Markdown page with its pictures beside it."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,6 +10,9 @@ import numpy as np
 from crash_replay.recording import Recording
 
 from .core.characteristic import characteristics
+from .core.effects import EFFECTS
+from .core.effects.applied import applied
+from .core.effects.base import Effect
 from .core.estimate import Description, ElementState, Estimate, ParameterStatus
 from .core.fold import run
 from .core.free_run import compare, free_run
@@ -37,24 +41,28 @@ def write_report(
     smooth: Callable[[np.ndarray], np.ndarray] = lambda values: values,
     compared: str = "unfiltered",
     settings: Mapping[str, float] = {},
+    effects: Mapping[str, Effect] = EFFECTS,
 ) -> Path:
     """Write `report.md` and its figures into the folder -> the page. The settings go to the methods that have them."""
     folder.mkdir(parents=True, exist_ok=True)
-    results = {method: _estimated(recording, structure, method, end, settings) for method in methods}
+    estimated = partial(_estimated, recording, structure, end=end, effects=effects)
+    structure = applied(structure, recording.test, effects)
+    results = {method: estimated(method, settings=settings) for method in methods}
     page = [f"# {recording.test.title or recording.test.id}", "", *_test(recording, structure, end), ""]
     page += _tables(results)
     page += _figures(structure, results, folder)
     best = methods[-1]
     page += _free_run(structure, results[best], best, folder, end, smooth, compared)
-    page += _jumps(recording, structure, folder, end)
+    page += _jumps(estimated("afmm", settings={}), folder)
     page += _masses(recording, structure, folder, end)
     return write_markdown(folder / "report.md", page)
 
 
 def _estimated(
-    recording: Recording, structure: Structure, method: str, end: float, settings: Mapping[str, float]
-) -> Result:
-    estimator = make_estimator(structure, recording.test, method, **settings)
+    recording: Recording, structure: Structure, method: str, end: float, settings: Mapping[str, float],
+    effects: Mapping[str, Effect],
+) -> Result:  # fmt: skip
+    estimator = make_estimator(structure, recording.test, method, effects=effects, **settings)
     estimates = run(estimator, (sample for sample in recording.samples() if sample.time <= end))
     if not any(estimate.time_ns > 0 for estimate in estimates):
         raise ModelError(f"test {recording.test.id} has no samples between the impact and {end:g} s")
@@ -227,8 +235,7 @@ def _free_run(
     ]  # fmt: skip
 
 
-def _jumps(recording: Recording, structure: Structure, folder: Path, end: float) -> list[str]:
-    result = _estimated(recording, structure, "afmm", end, {})
+def _jumps(result: Result, folder: Path) -> list[str]:
     found = [(e.time_ns * 1e-6, event) for e in result.estimates for event in e.events if event.kind == "jump"]
     page = ["## Jumps of the parameters (figure 4.13)", ""]
     if not found:

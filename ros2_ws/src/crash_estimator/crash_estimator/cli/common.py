@@ -1,5 +1,6 @@
 """What the commands share: exit statuses, settings on the command line, JSON without NaN."""
 
+import argparse
 import json
 import math
 import sys
@@ -11,6 +12,9 @@ import numpy as np
 
 from crash_replay.recording import RecordingError
 
+from ..core.effects import EFFECTS
+from ..core.effects.base import Effect
+from ..core.effects.user import load_effects
 from ..core.structure import ModelError
 
 
@@ -24,6 +28,15 @@ def guarded(command: Callable[[], int | None]) -> int:
         return 1
     except KeyboardInterrupt:
         return 130
+
+
+def add_effects_option(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--effects", metavar="FILE.py", help="your own effects; the file is executed")
+
+
+def effects_of(arguments: argparse.Namespace) -> dict[str, Effect]:
+    """The vocabulary, and the user's own effects where `--effects` names a file of them."""
+    return EFFECTS | (load_effects(arguments.effects) if arguments.effects else {})
 
 
 def parse_settings(pairs: list[str]) -> dict[str, float | int | bool]:

@@ -9,10 +9,10 @@ from ruamel.yaml import YAML
 
 from crash_replay.bag import read_bag
 
-from ..core.diagnosis.additions import key_of
 from ..core.diagnosis.diagnosis import Diagnosis, diagnose
 from ..core.effects import EFFECTS
 from ..core.effects.base import Effect
+from ..core.effects.targets import key_of
 from ..core.effects.user import load_effects
 from ..core.structure import EffectSpec
 from ..diagnosis_tables import diagnosis_tables
@@ -22,7 +22,7 @@ from .common import guarded, write_json
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="diagnose", description=__doc__)
-    parser.add_argument("bags", nargs="+", metavar="BAG", help="recordings of the same structure, best at different speeds")
+    parser.add_argument("bags", nargs="+", metavar="BAG", help="recordings of one structure, best at different speeds")
     parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
     parser.add_argument("--apply", metavar="NEW_MODEL.yaml", help="write the model with the effects that were found")
     parser.add_argument("--json", metavar="FILE", help="write everything that was found")
@@ -66,7 +66,8 @@ def _entry(spec: EffectSpec, effect: Effect, bodies: list[str]) -> dict:
         entry["coefficient"] = float(f"{spec.coefficient:.6g}")
     if spec.shape:
         entry["shape"] = {name: float(f"{value:.6g}") for name, value in spec.shape.items()}
-    return entry | {name: value for name in ("host", "touches", "taken_from", "variant") if (value := getattr(spec, name))}
+    more = ("host", "touches", "taken_from", "variant")
+    return entry | {name: value for name in more if (value := getattr(spec, name))}
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from ..core.fold import run
 from ..core.methods import METHODS, make_estimator
 from ..model_file import load_model, ready_models
 from ..tables import besides_table, error_table, parameter_table
-from .common import guarded, parse_settings, write_json
+from .common import add_effects_option, effects_of, guarded, parse_settings, write_json
 
 
 def main() -> None:
@@ -28,6 +28,7 @@ def main() -> None:
         action="store_true",
         help="find the masses that go with the accelerometers first, the other parameters with them",
     )
+    add_effects_option(parser)
     parser.add_argument("--json", metavar="FILE", help="write everything that was found")
     arguments = parser.parse_args()
     sys.exit(guarded(lambda: estimate(arguments)))
@@ -37,7 +38,7 @@ def estimate(arguments: argparse.Namespace) -> None:
     structure = load_model(arguments.model)
     recording = read_bag(arguments.bag)
     settings = parse_settings(arguments.set) | ({"effective_mass": True} if arguments.effective_mass else {})
-    estimator = make_estimator(structure, recording.test, arguments.method, **settings)
+    estimator = make_estimator(structure, recording.test, arguments.method, effects=effects_of(arguments), **settings)
     estimates = run(estimator, recording.samples())
     description, errors = estimator.description, equation_errors(estimator.description, estimates)
     print(f"{recording.test.id}: {len(recording)} samples, model {description.model}, method {description.method}")

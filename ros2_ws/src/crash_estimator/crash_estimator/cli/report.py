@@ -13,7 +13,7 @@ from ..core.methods import METHODS
 from ..core.structure import ModelError
 from ..model_file import load_model, ready_models
 from ..report_page import write_report
-from .common import guarded
+from .common import add_effects_option, effects_of, guarded
 from .simulate import smoother
 
 SHOWN = ["rls", "mrls", "constrained_kalman"]
@@ -30,6 +30,7 @@ def main() -> None:
     parser.add_argument(
         "--cfc", type=int, choices=(0, *CFC_CLASSES), default=None, help="filter of the free run's signals; 0: none"
     )
+    add_effects_option(parser)
     arguments = parser.parse_args()
     sys.exit(guarded(lambda: report(arguments)))
 
@@ -42,8 +43,9 @@ def report(arguments: argparse.Namespace) -> None:
         raise ModelError(f"{folder} is a file: --to takes a folder")
     smooth, said = smoother(recording, arguments.cfc)
     page = write_report(
-        recording, structure, list(dict.fromkeys(arguments.methods)), folder, arguments.end, smooth, said
-    )
+        recording, structure, list(dict.fromkeys(arguments.methods)), folder, arguments.end, smooth, said,
+        effects=effects_of(arguments),
+    )  # fmt: skip
     print(f"{recording.test.id}: {page} and {len(list(folder.glob('*.png')))} figures")
 
 

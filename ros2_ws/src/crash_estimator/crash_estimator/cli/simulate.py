@@ -14,6 +14,7 @@ from crash_replay.conditioning import CFC_CLASSES, cfc_filter
 from crash_replay.recording import Recording
 
 from ..core.characteristic import Characteristic, characteristics
+from ..core.effects.applied import applied
 from ..core.fold import run
 from ..core.free_run import Comparison, FreeRun, compare, free_run
 from ..core.methods import METHODS, make_estimator
@@ -21,7 +22,7 @@ from ..core.structure import ModelError, Structure
 from ..model_file import load_model, ready_models
 from ..tables import table
 from ..validation_tables import comparison_table
-from .common import guarded, parse_settings, write_json
+from .common import add_effects_option, effects_of, guarded, parse_settings, write_json
 
 FILTER = 60
 """CFC of signals that are rated, unless told otherwise: that of a vehicle structure's acceleration (SAE J211-1)."""
@@ -40,24 +41,25 @@ def main() -> None:
     parser.add_argument(
         "--cfc", type=int, choices=(0, *CFC_CLASSES), default=None, help="filter of the compared signals; 0: none"
     )
+    add_effects_option(parser)
     parser.add_argument("--json", metavar="FILE", help="write everything that was found")
     arguments = parser.parse_args()
     sys.exit(guarded(lambda: simulate(arguments)))
 
 
 def simulate(arguments: argparse.Namespace) -> None:
-    structure = load_model(arguments.model)
-    settings = parse_settings(arguments.set)
+    model, effects = load_model(arguments.model), effects_of(arguments)
+    settings = parse_settings(arguments.set) | {"effects": effects}
     recording = read_bag(arguments.bag)
     if not arguments.end > 0.0:
         raise ModelError(f"--end must be a time after the impact, above 0 s, got {arguments.end:g}")
-    estimator = make_estimator(structure, recording.test, arguments.method, **settings)
+    estimator = make_estimator(model, recording.test, arguments.method, **settings)
     estimates = run(estimator, recording.samples())
-    description = estimator.description
+    description, structure = estimator.description, applied(model, recording.test, effects)
     laws = characteristics(structure, description, estimates)
     if arguments.source:
         other = read_bag(arguments.source)
-        donor = make_estimator(structure, other.test, arguments.method, **settings)
+        donor = make_estimator(model, other.test, arguments.method, **settings)
         laws = characteristics(structure, donor.description, run(donor, other.samples()))
     simulated = free_run(structure, description, estimates, laws, arguments.end)
     smooth, said = smoother(recording, arguments.cfc)

@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .actions import beside_the_springs, coefficients
+from .effects.base import ElementMotion
 from .estimate import Description, ElementState, Estimate
 from .structure import Element, Structure
 
@@ -58,18 +60,25 @@ class Characteristic(NamedTuple):
 def characteristics(
     structure: Structure, description: Description, estimates: Sequence[Estimate]
 ) -> tuple[Characteristic, ...]:
-    """One for each element, from the samples after the impact."""
+    """One for each element, from the samples after the impact: its spring and damper, without the structure's actions."""
     after = [estimate for estimate in estimates if estimate.time_ns >= 0]
-    return tuple(_characteristic(k, element, description, after) for k, element in enumerate(structure.elements))
+    return tuple(_characteristic(k, element, structure, description, after) for k, element in enumerate(structure.elements))
 
 
-def _characteristic(k: int, element: Element, description: Description, after: Sequence[Estimate]) -> Characteristic:
+def _characteristic(
+    k: int, element: Element, structure: Structure, description: Description, after: Sequence[Estimate]
+) -> Characteristic:
     crush = np.array([e.crush[k] for e in after])
     rate = np.array([e.rate[k] for e in after])
     apart = np.array([e.state[k] == ElementState.APART for e in after])
     index = description.parameters.index(f"{element.name}.damping")
     damper = np.array([e.parameters[index] for e in after])
     force = np.where(apart, 0.0, np.array([e.force[k] for e in after]) - damper * rate)
+    if structure.actions or element.factor:
+        time, peak = np.array([e.time_ns for e in after]) * 1e-9, np.maximum(np.maximum.accumulate(crush), 0.0)
+        motion = ElementMotion(time, crush, rate, peak, force)
+        parallel, factor = beside_the_springs(structure, coefficients(structure, description, after[-1]), k, motion)
+        force = np.where(apart, 0.0, (force - parallel) / factor)
     squares = float(np.sum(rate[~apart] ** 2))
     damping = float(np.sum((damper * rate**2)[~apart])) / squares if squares else element.damping.value
     if element.stiffness.shape == "constant" and element.unloading is None:

@@ -37,6 +37,7 @@ class SpringLaw(NamedTuple):
     shift: np.ndarray  # (e,) N: - Ku (X_peak - X) on an unloading line
     carries: np.ndarray  # (e,) False when apart
     on_line: np.ndarray  # (e,) True on an unloading line
+    peak: np.ndarray  # (e,) m, the largest crush so far
 
 
 class Contact:
@@ -59,7 +60,7 @@ class Contact:
         """stiffness (e,): the latest known or estimated secant stiffness, N/m; unloading (e,) where it is estimated."""
         if motion.time < 0.0:
             nothing, none = np.zeros(len(self.names)), np.zeros(len(self.names), dtype=bool)
-            return before, SpringLaw(nothing, nothing, none, none), ()
+            return before, SpringLaw(nothing, nothing, none, none, before.peak_crush), ()
         crush, peak = motion.crush, np.maximum(before.peak_crush, motion.crush)
         on_line = self.plastic & (crush < peak)
         lever = np.where(on_line, peak, crush)
@@ -73,7 +74,7 @@ class Contact:
         unloads = np.where(self.plastic, on_line, turned)
         state = np.where(apart, ElementState.APART, np.where(unloads, ElementState.UNLOADING, ElementState.LOADING))
         state = state.astype(np.uint8)
-        law = SpringLaw(np.where(apart, 0.0, lever), np.where(apart, 0.0, shift), ~apart, on_line & ~apart)
+        law = SpringLaw(np.where(apart, 0.0, lever), np.where(apart, 0.0, shift), ~apart, on_line & ~apart, peak)
         return ContactState(peak, peak_rate, state), law, self._events(before.state, state, crush)
 
     def _events(self, before: np.ndarray, after: np.ndarray, crush: np.ndarray) -> tuple[Event, ...]:

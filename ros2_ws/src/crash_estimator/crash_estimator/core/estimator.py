@@ -43,6 +43,7 @@ class Estimator:
         self.kinematics = Kinematics(structure, test)
         self.contact = Contact(structure)
         self.regressor = Regressor(structure)
+        self.start = self.kinematics.initial_displacement, self.kinematics.initial_velocity
         self.structure = structure
         self.method = method
         parameters, extra = structure.parameters, self._extra_names()
@@ -75,6 +76,7 @@ class Estimator:
     def step(self, state: State, sample: Sample) -> tuple[State, Estimate]:
         """Fold one sample in; `state` is left as it was."""
         kinematics, motion = self.kinematics.step(state.kinematics, sample)
+        motion = self.regressor.corrected(motion, state.update.theta, self.start)
         stiffness = self.regressor.secant(state.update.theta, state.contact.peak_crush)
         unloading = self.regressor.unloading(state.update.theta)
         contact, law, events = self.contact.step(state.contact, motion, stiffness, unloading)

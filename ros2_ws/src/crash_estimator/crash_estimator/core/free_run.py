@@ -11,7 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .actions import beside_the_springs, coefficients
 from .characteristic import Characteristic, characteristics
+from .effects.base import ElementMotion
 from .estimate import Description, Estimate
 from .rating import Rating, rate
 from .structure import ModelError, Structure
@@ -62,7 +64,7 @@ def free_run(
         raise ModelError(f"a free run needs at least two samples from time zero to {end:g} s, found {len(after)}")
     laws = given or characteristics(structure, description, estimates)
     time = np.array([e.time_ns for e in after]) * 1e-9
-    run = _System(structure, laws, time, after)
+    run = _System(structure, laws, coefficients(structure, description, after[-1]), time, after)
     x, v = after[0].displacement.copy(), after[0].velocity.copy()
     peak = run.largest(np.zeros(len(laws)), time[0], x)
     states = [(x, v, peak)]
@@ -72,7 +74,8 @@ def free_run(
         for k in range(steps):
             x, v, peak = run.step(start + k * h, h, x, v, peak)
         states.append((x, v, peak))
-    acceleration = np.array([run.accelerations(t, *state) for t, state in zip(time, states)])
+    loads = np.array([run.loads(t, *state) for t, state in zip(time, states)])
+    acceleration = np.array([run.accelerations(t, load) for t, load in zip(time, loads)])
     force = np.array([run.forces(t, *state) for t, state in zip(time, states)])
     return FreeRun(
         time=time,
@@ -81,7 +84,7 @@ def free_run(
         acceleration=acceleration,
         crush=np.array([run.motion(t, x, v)[0] for t, (x, v, _) in zip(time, states)]),
         force=force,
-        predicted=force @ structure.force_to_equation.T,
+        predicted=run.recorded(acceleration, loads),
         measured=np.array([e.measured for e in after]),
         measured_velocity=np.array([e.velocity for e in after]),
     )
@@ -91,10 +94,20 @@ class _System:
     """The right-hand side, with what is measured interpolated between samples."""
 
     def __init__(
-        self, structure: Structure, laws: tuple[Characteristic, ...], time: np.ndarray, after: Sequence[Estimate]
-    ):
+        self, structure: Structure, laws: tuple[Characteristic, ...], c: np.ndarray, time: np.ndarray, after: Sequence[Estimate]
+    ):  # fmt: skip
+        self.structure, self.c = structure, c
         self.laws, self.ends, self.time = laws, structure.ends, time
         self.masses = np.array([b.mass if b.free else np.inf for b in structure.bodies])
+        for value, action in zip(c, structure.actions):
+            if action.kind == "mass":
+                self.masses[action.at] += value
+            elif action.kind == "inertia" and action.coefficient.estimated and action.lighter >= 0:
+                self.masses[action.lighter] -= value
+        self.carried = [(k, structure.body_index[b.carried_by]) for k, b in enumerate(structure.bodies) if b.carried_by]
+        self.origin = np.array([e.origin for e in structure.elements])
+        self.acts = {a.at for a in structure.actions if a.kind in ("element", "factor")}
+        self.acts |= {k for k, e in enumerate(structure.elements) if e.factor}
         self.driven = [k for k, body in enumerate(structure.bodies) if body.driven]
         self.given = [k for k, element in enumerate(structure.elements) if element.displacement]
         measured = np.array([e.acceleration for e in after])
@@ -104,7 +117,8 @@ class _System:
 
     def motion(self, t: float, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(e,) crush and rate."""
-        crush, rate = x[self.ends[:, 0]] - x[self.ends[:, 1]], v[self.ends[:, 0]] - v[self.ends[:, 1]]
+        crush = x[self.ends[:, 0]] - x[self.ends[:, 1]] - self.origin
+        rate = v[self.ends[:, 0]] - v[self.ends[:, 1]]
         for k in self.given:
             crush[k], rate[k] = np.interp(t, self.time, self.crushes[k]), np.interp(t, self.time, self.rates[k])
         return crush, rate
@@ -116,28 +130,62 @@ class _System:
         crush, rate = self.motion(t, x, v)
         peak = np.maximum(peak, crush)
         return np.array([
-            law.spring(c, p) + law.damping * r if law.carries(c, p) else 0.0
-            for law, c, r, p in zip(self.laws, crush, rate, peak)
+            self.force(t, k, law, c, r, p) if law.carries(c, p) else 0.0
+            for k, (law, c, r, p) in enumerate(zip(self.laws, crush, rate, peak))
         ])  # fmt: skip
 
-    def accelerations(self, t: float, x: np.ndarray, v: np.ndarray, peak: np.ndarray) -> np.ndarray:
+    def force(self, t: float, element: int, law: Characteristic, crush: float, rate: float, peak: float) -> float:
+        """N, of an element that carries."""
+        spring, damper = law.spring(crush, peak), law.damping * rate
+        if element not in self.acts:
+            return spring + damper
+        motion = ElementMotion(*(np.array([value]) for value in (t, crush, rate, peak, spring)))
+        parallel, factor = beside_the_springs(self.structure, self.c, element, motion)
+        return float(spring * factor[0] + damper + parallel[0])
+
+    def loads(self, t: float, x: np.ndarray, v: np.ndarray, peak: np.ndarray) -> np.ndarray:
+        """(b,) N: the elements' forces on each body, what it carries included, and what the effects add."""
         force, loads = self.forces(t, x, v, peak), np.zeros(len(x))
         np.subtract.at(loads, self.ends[:, 0], force)
         np.add.at(loads, self.ends[:, 1], force)
+        for k, host in self.carried:
+            loads[host] += loads[k]
+        for value, action in zip(self.c, self.structure.actions):
+            if action.kind == "body":
+                loads[action.at] += value * action.force(np.array([t]))[0]
+            elif action.kind == "inertia":
+                loads[action.at] -= value * np.interp(t, self.time, self.driving[action.body])
+        return loads
+
+    def recorded(self, acceleration: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """(n, q) what the equations' channels would show of (n, b) accelerations and loads."""
+        true = [acceleration[:, k] if self.structure.bodies[k].free else loads[:, k] for k in self.structure.equations]
+        shown = np.stack(true, axis=1)
+        for value, action in zip(self.c, self.structure.actions):
+            if action.kind in ("gain", "offset") and action.at in self.structure.equations:
+                row = self.structure.equations.index(action.at)
+                more = shown[:, row] if action.kind == "gain" else 1.0
+                shown[:, row] = shown[:, row] + action.share * value * more
+        return shown
+
+    def accelerations(self, t: float, loads: np.ndarray) -> np.ndarray:
         acceleration = loads / self.masses
         for k in self.driven:
             acceleration[k] = np.interp(t, self.time, self.driving[k])
         return acceleration
 
+    def pushed(self, t: float, x: np.ndarray, v: np.ndarray, peak: np.ndarray) -> np.ndarray:
+        return self.accelerations(t, self.loads(t, x, v, peak))
+
     def step(self, t: float, h: float, x: np.ndarray, v: np.ndarray, peak: np.ndarray) -> tuple[np.ndarray, ...]:
         """One Runge-Kutta step of h s; the largest crush follows at its end."""
-        a1 = self.accelerations(t, x, v, peak)
+        a1 = self.pushed(t, x, v, peak)
         v2 = v + 0.5 * h * a1
-        a2 = self.accelerations(t + 0.5 * h, x + 0.5 * h * v, v2, peak)
+        a2 = self.pushed(t + 0.5 * h, x + 0.5 * h * v, v2, peak)
         v3 = v + 0.5 * h * a2
-        a3 = self.accelerations(t + 0.5 * h, x + 0.5 * h * v2, v3, peak)
+        a3 = self.pushed(t + 0.5 * h, x + 0.5 * h * v2, v3, peak)
         v4 = v + h * a3
-        a4 = self.accelerations(t + h, x + h * v3, v4, peak)
+        a4 = self.pushed(t + h, x + h * v3, v4, peak)
         x, v = x + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4), v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
         return x, v, self.largest(peak, t + h, x)
 

@@ -6,7 +6,6 @@ from a stated initial velocity and displacement, after removing each channel's p
 two samples the acceleration is taken as a straight line: v += dt (a0 + a1)/2, x += v0 dt + dt^2 (2 a0 + a1)/6.
 """
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +39,9 @@ class Motion(NamedTuple):
     measured: np.ndarray  # (q,) left-hand side of each equation, NaN where not measured
     noise: np.ndarray  # (q,) variance of it before the impact: the sensors' noise; NaN where not known
     offset_variance: np.ndarray  # (b,) (m/s^2)^2 by which the removed zero offset may be wrong; 0 where not known
+    held: np.ndarray  # (b,) m/s^2, the last valid acceleration after the impact
+    displacement_by: np.ndarray | None = None  # (b, n) its change with each of n estimated errors of channels
+    velocity_by: np.ndarray | None = None  # (b, n)
 
 
 class KinematicState(NamedTuple):
@@ -53,6 +55,23 @@ class KinematicState(NamedTuple):
     acceleration: np.ndarray  # (b,) the last valid one
     crush: np.ndarray  # (e,) of the last sample
     rate: np.ndarray  # (e,)
+
+
+def initial_motion(structure: Structure, test: Test) -> tuple[np.ndarray, np.ndarray]:
+    """(b,) displacement m and velocity m/s at time zero: stated for the body, or for the one that the test says its
+    sensor sits on (a cab on a car).
+
+    A fixed body rests at 0, whatever the test says of its name.
+    """
+    both = np.zeros((2, len(structure.bodies)))
+    for values, stated, part in zip(both, (test.initial_displacement, test.initial_velocity), (0, 1)):
+        for k, body in enumerate(structure.bodies):
+            carriers = [test.channels[test.index(name)].body for name in body.acceleration]
+            known = [name for name in (body.name, *carriers) if name in stated]
+            values[k] = 0.0 if body.fixed else stated[known[0]] if known else body.start[part]
+    if not np.isfinite(both).all():
+        raise ModelError("an initial velocity or displacement of the test is not a finite number")
+    return both[0], both[1]
 
 
 class Kinematics:
@@ -73,22 +92,8 @@ class Kinematics:
         ]
         self.balances = [(row, k) for row, k in enumerate(structure.equations) if bodies[k].free]
         self.moving = np.array([bool(body.acceleration) for body in bodies])
-        self.initial_velocity = self._initial(test, test.initial_velocity)
-        self.initial_displacement = self._initial(test, test.initial_displacement)
-
-    def _initial(self, test: Test, stated: Mapping[str, float]) -> np.ndarray:
-        """(b,) stated for the body, or for the one that the test says its sensor sits on (a cab on a car).
-
-        A fixed body rests at 0, whatever the test says of its name.
-        """
-        values = np.zeros(len(self.structure.bodies))
-        for k, body in enumerate(self.structure.bodies):
-            carriers = [test.channels[test.index(name)].body for name in body.acceleration]
-            known = [name for name in (body.name, *carriers) if name in stated]
-            values[k] = stated[known[0]] if known and not body.fixed else 0.0
-        if not np.isfinite(values).all():
-            raise ModelError("an initial velocity or displacement of the test is not a finite number")
-        return values
+        self.initial_displacement, self.initial_velocity = initial_motion(structure, test)
+        self.origin = np.array([element.origin for element in elements])
 
     def init(self) -> KinematicState:
         channels, bodies = np.zeros(self.channel_count), np.zeros(len(self.structure.bodies))
@@ -124,7 +129,7 @@ class Kinematics:
             )
         noise, offset_variance = self._noise(state, dt)
         return state, Motion(
-            sample.time, dt, displacement, velocity, acceleration, crush, rate, measured, noise, offset_variance
+            sample.time, dt, displacement, velocity, acceleration, crush, rate, measured, noise, offset_variance, now
         )
 
     def _body_accelerations(self, values: np.ndarray) -> np.ndarray:
@@ -141,10 +146,11 @@ class Kinematics:
     def _crush(self, state, values, displacement, velocity, dt) -> tuple[np.ndarray, np.ndarray]:
         """(e,) crush and rate: from the bodies' motion, or from measured channels where the model names them."""
         ends = self.structure.ends
-        crush = displacement[ends[:, 0]] - displacement[ends[:, 1]]
+        crush = displacement[ends[:, 0]] - displacement[ends[:, 1]] - self.origin
         rate = velocity[ends[:, 0]] - velocity[ends[:, 1]]
         for element, column in self.crush_channels:
-            crush[element] = values[column] if values[column] == values[column] else state.crush[element]
+            measured = values[column] - self.origin[element]
+            crush[element] = measured if measured == measured else state.crush[element]
         for element in self.derived_rates:
             slope = (crush[element] - state.crush[element]) / dt if dt > 0 else 0.0
             rate[element] = state.rate[element] + (slope - state.rate[element]) * dt / (dt + RATE_SMOOTHING)

@@ -1,6 +1,6 @@
 """The table of estimation methods."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from difflib import get_close_matches
 from typing import Any, NamedTuple, Protocol
@@ -8,6 +8,10 @@ from typing import Any, NamedTuple, Protocol
 from crash_replay.recording import Sample, Test
 
 from .compiled.estimator import CompiledEstimator
+from .effects import EFFECTS
+from .effects.applied import applied
+from .effects.base import Effect
+from .effects.channels import Corrected, known_errors
 from .estimate import Description, Estimate
 from .estimator import Estimator, Method
 from .estimators.afmm import Afmm
@@ -70,13 +74,15 @@ def make_estimator(
     damping_after: float | None = None,
     effective_mass: bool = False,
     compiled: bool = True,
+    effects: Mapping[str, Effect] = EFFECTS,
     **settings,
 ) -> AnyEstimator:
     """An estimator of the structure's parameters (effective_mass: of its masses) on a test's channels.
 
     method: a key of METHODS; settings: fields of that method's dataclass, such as forgetting=0.98; damping_after: hold
     each damping at its initial value until its element's stiffness is known to this share of its value; effective_mass:
-    find the masses first, and the method's parameters with them; compiled: use the compiled form where there is one (it agrees with the readable one but for rounding).
+    find the masses first, and the method's parameters with them; compiled: use the compiled form where there is one (it
+    agrees with the readable one but for rounding); effects: the table that the structure's effects are in.
     Raises ModelError or RecordingError where the model does not fit the test, or a setting does not exist.
     """
     if method not in METHODS:
@@ -86,7 +92,7 @@ def make_estimator(
     if effective_mass and method != "effective_mass":
         masses = EffectiveMass(structure, test, MassSettings(theta_settings(structure)))
         return MassFirst(
-            structure, masses, lambda s: make_estimator(s, test, method, damping_after, False, compiled, **settings)
+            structure, masses, lambda s: make_estimator(s, test, method, damping_after, False, compiled, effects, **settings)
         )
     recipe = METHODS[method]
     known = [f.name for f in fields(recipe.kind) if f.init and f.name != "settings"]
@@ -95,10 +101,13 @@ def make_estimator(
             near = get_close_matches(name, known, n=1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
             raise ModelError(f"method {method} has no setting {name!r}, only {', '.join(known)}{hint}")
-    structure = recipe.structure(structure)
+    errors = known_errors(structure, test, effects)
+    structure = recipe.structure(applied(structure, test, effects))
     chosen = recipe.kind(theta_settings(structure), **recipe.settings | settings)
     if damping_after is not None and recipe.estimator is Estimator:
         chosen = DampingLater(chosen, damping_after)
     if compiled and structure.first_order and isinstance(chosen, (Rls, Kalman)):
-        return CompiledEstimator(structure, test, chosen, method)
-    return recipe.estimator(structure, test, chosen, method)
+        estimator = CompiledEstimator(structure, test, chosen, method)
+    else:
+        estimator = recipe.estimator(structure, test, chosen, method)
+    return estimator if errors is None else Corrected(estimator, errors)

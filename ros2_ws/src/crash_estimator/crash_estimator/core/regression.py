@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .actions import Actions
 from .contact import SpringLaw
 from .estimate import ParameterStatus
 from .kinematics import Motion
@@ -51,7 +52,7 @@ class Further:
     """Parameters beyond stiffness and damping: higher powers of crush and rate, estimated unloading slopes."""
 
     def __init__(self, structure: Structure):
-        parameters, elements = structure.parameters, structure.elements
+        parameters, elements = structure.element_parameters, structure.elements
         self.element = np.array([p.element for p in parameters], dtype=int)
         self.power = np.array([p.power for p in parameters])
         self.of_crush = np.array([p.unit.startswith("N/m^") for p in parameters], dtype=bool)
@@ -87,7 +88,9 @@ class Regressor:
     """Turns motion and contact into the regression."""
 
     def __init__(self, structure: Structure):
-        parameters = structure.parameters
+        parameters = structure.element_parameters
+        self.actions = Actions(structure) if structure.actions else None
+        self.factors = [(k, element.factor) for k, element in enumerate(structure.elements) if element.factor]
         self.share = structure.force_to_equation
         self.element = np.array([p.element for p in parameters], dtype=int)
         self.of_element = np.equal.outer(np.arange(len(structure.elements)), self.element).astype(float)
@@ -105,7 +108,12 @@ class Regressor:
         self.estimated = np.array([p.coefficient.estimated for p in parameters], dtype=bool)
         self.value = np.where(self.estimated, 0.0, [p.coefficient.value for p in parameters])
         self.known_unloading = np.array([e.unloading or 0.0 for e in structure.elements])
+        self.of_spring = np.array([p.is_stiffness or p.is_unloading or p.unit.startswith("N/m^") for p in parameters], dtype=bool)
         self.drift_squared = np.array([self._drift(p) ** 2 for p in parameters])
+        self.every = tuple(  # of all parameters, the actions' too: element, is_stiffness, estimated
+            np.array(column)
+            for column in zip(*((p.element, p.is_stiffness, p.coefficient.estimated) for p in structure.parameters))
+        )
         self.noise = np.array([structure.bodies[k].noise or np.nan for k in structure.equations]) ** 2
 
     @staticmethod
@@ -124,6 +132,9 @@ class Regressor:
         shift = law.shift
         if self.further is not None:
             lever, shift = self.further.lever(lever, motion, law), self.further.known(shift)
+        factor = self._factor(motion)
+        if factor is not None:
+            lever, shift = np.where(self.of_spring, factor[self.element] * lever, lever), factor * shift
         forces = Forces(self.of_element * lever, shift)
         active = self.estimated & carries
         known = self.share @ (forces.per_unit @ self.value + shift)
@@ -131,23 +142,50 @@ class Regressor:
         folds = np.abs(motion.rate) * motion.dt / np.maximum(np.abs(motion.crush), SHORTEST_CRUSH)
         walk = np.where(active & ~law.on_line[self.element], self.drift_squared * folds[self.element], 0.0)
         noise = np.maximum(np.where(np.isnan(self.noise), motion.noise, self.noise), QUIETEST**2)
-        offset_gradient = self.own_offset + self.share @ self._per_offset(motion, law, theta)
+        slopes = self._slopes(law, theta, factor)
+        per_offset = self.share @ self._per_offset(motion, slopes)
+        if self.actions is not None:
+            static = np.where(self.of_spring, forces.per_unit, 0.0) @ theta[: len(lever)] + shift
+            per_unit = self.actions.forces(motion, law, static)
+            known, gradient, heavier = self.actions.added(known, gradient, motion, per_unit, slopes, theta)
+            per_offset = heavier[:, None] * per_offset
+            active = np.concatenate([active, self.actions.estimated & (gradient[:, len(lever) :] != 0.0).any(axis=0)])
+            walk = np.concatenate([walk, np.zeros(len(per_unit[0]))])
+            forces = Forces(np.hstack([forces.per_unit, per_unit]), shift)
         return (
             Regression(
                 known, gradient, motion.measured, active, walk, noise, motion.dt, motion.time,
-                offset_gradient, motion.offset_variance,
+                self.own_offset + per_offset, motion.offset_variance,
             ),
             forces,
         )  # fmt: skip
 
-    def _per_offset(self, motion: Motion, law: SpringLaw, theta: np.ndarray) -> np.ndarray:
-        """(e, b) N s^2/m. An accelerometer whose zero is wrong by b has moved its body by b t^2 / 2 too far and made it
-        b t too fast, and so changed the element's force by -(dF/dX t^2 / 2 + dF/dV t) b."""
+    def corrected(self, motion: Motion, theta: np.ndarray, start: tuple[np.ndarray, np.ndarray]) -> Motion:
+        """The motion without the errors of channels that are estimated; start: (b,) m and m/s at time zero."""
+        return motion if self.actions is None else self.actions.corrected(motion, theta, start)
+
+    def _factor(self, motion: Motion) -> np.ndarray | None:
+        """(e,) what multiplies the static forces; None: nothing does."""
+        if not self.factors:
+            return None
+        factor = np.ones(len(motion.rate))
+        for k, of_rate in self.factors:
+            factor[k] = of_rate(motion.rate[[k]])[0]
+        return factor
+
+    def _slopes(self, law: SpringLaw, theta: np.ndarray, factor: np.ndarray | None) -> np.ndarray:
+        """(2, e) change of each element's force with its crush, N/m, and rate, N s/m."""
         slope = self.secant(theta, law.lever)
         unloading = self.unloading(theta)
         slope = np.where(law.on_line, self.known_unloading if unloading is None else unloading, slope)
-        change = 0.5 * motion.time**2 * slope + motion.time * theta[self.damping_index]
-        return -np.where(law.carries, change, 0.0)[:, None] * self.crush_of_body
+        slope = slope if factor is None else factor * slope
+        return np.where(law.carries, [slope, theta[self.damping_index]], 0.0)
+
+    def _per_offset(self, motion: Motion, slopes: np.ndarray) -> np.ndarray:
+        """(e, b) N s^2/m. An accelerometer whose zero is wrong by b has moved its body by b t^2 / 2 too far and made it
+        b t too fast, and so changed the element's force by -(dF/dX t^2 / 2 + dF/dV t) b."""
+        change = 0.5 * motion.time**2 * slopes[0] + motion.time * slopes[1]
+        return -change[:, None] * self.crush_of_body
 
     def secant(self, theta: np.ndarray, peak: np.ndarray) -> np.ndarray:
         """(e,) N/m: each element's stiffness, at the crush `peak` (e,) where it has higher powers."""
@@ -160,8 +198,9 @@ class Regressor:
 
     def status(self, law: SpringLaw, clamped: np.ndarray) -> np.ndarray:
         """(p,) ParameterStatus, uint8."""
+        element, is_stiffness, estimated = self.every
         status = np.where(clamped, ParameterStatus.CLAMPED, ParameterStatus.ESTIMATED)
-        status[law.on_line[self.element] & self.is_stiffness & ~clamped] = ParameterStatus.UNLOADING
-        status[~law.carries[self.element]] = ParameterStatus.APART
-        status[~self.estimated] = ParameterStatus.KNOWN
+        status[law.on_line[element] & is_stiffness & ~clamped] = ParameterStatus.UNLOADING
+        status[~law.carries[element] & (element >= 0)] = ParameterStatus.APART
+        status[~estimated] = ParameterStatus.KNOWN
         return status.astype(np.uint8)

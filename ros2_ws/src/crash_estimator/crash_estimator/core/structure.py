@@ -10,7 +10,7 @@ A free body gives one equation, divided by its mass so that measured, predicted 
 the accelerometer's m/s^2; a fixed body with a measured force gives another, in N, the force on it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
@@ -41,6 +41,8 @@ class Body:
     fixed: bool = False
     force: str | None = None  # channel of the measured force on a fixed body
     noise: float | None = None  # standard deviation of its equation's error, m/s^2 or N; None: found from the data
+    carried_by: str | None = None  # a driven body within another one, which feels what pushes it
+    start: tuple[float, float] = (0.0, 0.0)  # m, m/s at time zero, where the test does not say
 
     @property
     def free(self) -> bool:
@@ -86,6 +88,8 @@ class Element:
     velocity: str | None = None  # channel of the rate of crush; None: the crush's derivative
     terms: tuple[Term, ...] = ()  # powers beyond the first
     unloading_slope: Coefficient | None = None  # an unloading stiffness to be estimated, in place of a known one
+    origin: float = 0.0  # m: the crush counts from here, as beyond a gap
+    factor: Callable[[np.ndarray], np.ndarray] | None = None  # of the rates (n,) m/s: what multiplies the static force
 
 
 @dataclass(frozen=True)
@@ -103,12 +107,28 @@ class EffectSpec:
 
 
 @dataclass(frozen=True)
+class Action:
+    """An effect at work that no element or body has a place for; `core.effects.applied` makes them, `core.actions` acts."""
+
+    name: str  # of its parameter, such as door_rib.coulomb_friction
+    unit: str
+    kind: str  # element, factor, body, inertia, mass, gain or offset
+    at: int  # the element, or the body: of "inertia" the one that feels it
+    coefficient: Coefficient
+    scale: float  # order of magnitude of the coefficient
+    force: Callable | None = None  # element: ElementMotion -> (g,), factor: rate (g,) -> h, body: time (g,) s -> N
+    body: int = -1  # inertia: whose
+    lighter: int = -1  # inertia: the body whose mass it was counted in, -1: none
+    share: float = 1.0  # gain, offset: of the channel in its body's acceleration
+
+
+@dataclass(frozen=True)
 class Parameter:
     """One entry of theta: a coefficient with its name, unit and scale."""
 
     name: str
     unit: str
-    element: int
+    element: int  # -1: of no element
     is_stiffness: bool
     coefficient: Coefficient
     scale: float  # order of magnitude, for the initial standard deviation
@@ -124,6 +144,7 @@ class Structure:
     bodies: tuple[Body, ...]
     elements: tuple[Element, ...]
     effects: tuple[EffectSpec, ...] = ()
+    actions: tuple[Action, ...] = ()  # of the effects, once they are applied
 
     def __post_init__(self):
         for element in self.elements:
@@ -173,15 +194,28 @@ class Structure:
         share = np.zeros((len(self.equations), len(self.elements)))
         for row, k in enumerate(self.equations):
             inertia = self.bodies[k].mass if self.bodies[k].free else 1.0
-            share[row] = ((self.ends[:, 1] == k).astype(float) - (self.ends[:, 0] == k)) / inertia
+            a, b = (np.isin(self.ends[:, side], self.pushed_with(k)).astype(float) for side in (0, 1))
+            share[row] = (b - a) / inertia
         return share
+
+    def pushed_with(self, body: int) -> list[int]:
+        """The body and those that it carries."""
+        return [k for k, other in enumerate(self.bodies) if body in (k, self.body_index.get(other.carried_by))]
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
+        """Those of the elements, then one for each action."""
+        return self.element_parameters + tuple(
+            Parameter(a.name, a.unit, a.at if a.kind in ("element", "factor") else -1, False, a.coefficient, a.scale)
+            for a in self.actions
+        )
+
+    @cached_property
+    def element_parameters(self) -> tuple[Parameter, ...]:
         """Stiffness and damping of every element, known ones included; then higher powers and estimated unloading."""
         found = []
         for k, element in enumerate(self.elements):
-            mass = self._reduced_mass(k)
+            mass = self.reduced_mass(k)
             for kind, unit, scale in (
                 ("stiffness", "N/m", mass * CONTACT_FREQUENCY**2),
                 ("damping", "N*s/m", mass * CONTACT_FREQUENCY),
@@ -194,7 +228,7 @@ class Structure:
     def _further_parameters(self) -> list[Parameter]:
         found = []
         for k, element in enumerate(self.elements):
-            mass = self._reduced_mass(k)
+            mass = self.reduced_mass(k)
             for term in element.terms:
                 spring, n = term.of == "crush", term.power
                 name = f"{element.name}.{'stiffness' if spring else 'damping'}{n}"
@@ -211,11 +245,13 @@ class Structure:
     @property
     def first_order(self) -> bool:
         """Whether stiffness and damping of the first power, with known unloading, are all there is."""
-        return not any(element.terms or element.unloading_slope for element in self.elements)
+        more = any(e.terms or e.unloading_slope or e.origin or e.factor for e in self.elements)
+        return not (more or self.actions or any(body.carried_by for body in self.bodies))
 
-    def _reduced_mass(self, element: int) -> float:
-        """Of the two bodies of an element; a driven or fixed one counts as infinitely heavy."""
-        ends = (self.bodies[k] for k in self.ends[element])
+    def reduced_mass(self, element: int) -> float:
+        """Of the two bodies of an element; a driven or fixed one counts as infinitely heavy, a carried one as its carrier."""
+        ends = [self.bodies[k] for k in self.ends[element]]
+        ends = [self.bodies[self.body_index[end.carried_by]] if end.carried_by else end for end in ends]
         inverse = sum(1.0 / body.mass for body in ends if body.free and body.mass)
         return 1.0 / inverse if inverse else 1.0
 
@@ -235,4 +271,11 @@ class Structure:
         wanted += [(f"body {b.name}", b.force, "force") for b in self.bodies if b.force]
         wanted += [(f"element {e.name}", e.displacement, "displacement") for e in self.elements if e.displacement]
         wanted += [(f"element {e.name}", e.velocity, "velocity") for e in self.elements if e.velocity]
+        wanted += [(f"effect {e.type}", e.target, "acceleration") for e in self.effects if self._names_a_channel(e, wanted)]
         return wanted
+
+    def _names_a_channel(self, effect: EffectSpec, wanted: list[tuple[str, str, str]]) -> bool:
+        """Whether an effect's target is a channel that no body or element reads."""
+        others = {name for _, name, _ in wanted} | {part.name for part in (*self.bodies, *self.elements)}
+        pairs = {f"{a.name}-{b.name}" for a in self.bodies for b in self.bodies}
+        return effect.target not in others | pairs

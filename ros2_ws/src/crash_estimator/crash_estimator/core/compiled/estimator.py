@@ -61,7 +61,7 @@ class CompiledEstimator:
         memory = state.memory.copy()
         rows = np.empty((len(times_ns), self._row_length))
         follow(self.plan, self.method_plan, self.size, memory, times_ns, values, rows)
-        return CompiledState(memory, rows[-1] if len(rows) else state.last_row), rows
+        return CompiledState(memory, rows[-1].copy() if len(rows) else state.last_row), rows  # not the whole block
 
     def step(self, state: CompiledState, sample: Sample) -> tuple[CompiledState, Estimate]:
         """Fold one sample in; `state` is left as it was."""

@@ -7,7 +7,7 @@ from itertools import permutations
 from crash_replay.recording import Test
 
 from ..structure import EffectSpec, ModelError, Structure
-from .base import AttachedBody, BodyForce, BodyInertia, ChannelError, Effect, PairSpring
+from .base import AttachedBody, BodyForce, BodyInertia, ChannelError, Effect, PairSpring, StaticFactor
 
 NOUN = {"element": "an element", "body": "a free body", "channel": "a channel", "between": "two bodies"}
 
@@ -58,12 +58,25 @@ def checked(
     for name in spec.shape:
         if name not in effect.shapes:
             raise ModelError(f"{what} has no shape constant {name!r}; it has {', '.join(effect.shapes) or 'none'}")
+    if spec.coefficient is not None:
+        _admissible(f"{what} on {spec.target}", spec.coefficient, effect)
+    for name, value in spec.shape.items():
+        if not value > 0.0:
+            raise ModelError(f"{what} on {spec.target}: {name} must be above 0, got {value:g}")
     bodies = [body.name for body in structure.bodies]
     for role in ("host", "touches", "taken_from"):
         name = getattr(spec, role)
         if name is not None and name not in bodies:
             raise ModelError(f"{what} on {spec.target}: {role} must be a body, got {name!r}; {_choice(name, bodies)}")
     return effect
+
+
+def _admissible(what: str, coefficient: float, effect: Effect) -> None:
+    """Raises ModelError where a coefficient is outside the effect's physical limits."""
+    low, high = (0.0, float("inf")) if isinstance(effect, StaticFactor) else (effect.low, effect.high)
+    if not low <= coefficient <= high:
+        limits = f"not below {low:g}" if high == float("inf") else f"from {low:g} to {high:g}"
+        raise ModelError(f"{what}: coefficient must be {limits} {effect.unit}".rstrip() + f", got {coefficient:g}")
 
 
 def _known(structure: Structure, name: str, effects: Mapping[str, Effect]) -> Effect:
