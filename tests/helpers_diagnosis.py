@@ -69,7 +69,8 @@ class Stage:
 
     def wait_for_listeners(self) -> None:
         count = len(self.diagnoses)
-        self.spin_until(lambda: self.samples.get_subscription_count() == count, "the diagnosis subscribes", 60.0)
+        listening = self.samples.get_subscription_count
+        self.spin_until(lambda: listening() == count, "the diagnosis subscribes", 60.0)
 
     def spin_until(self, done: Callable[[], bool], what: str, patience: float = 30.0) -> None:
         deadline = time.monotonic() + patience
@@ -86,10 +87,10 @@ class Stage:
         self.test.publish(test_to_msg(recording))
         self.spin(0.1)
 
-    def send(self, recording: Recording, start: int = 0, stop: int | None = None, block: int = 20, run: int = 0) -> None:
-        stop = len(recording) if stop is None else stop
+    def send(self, recording: Recording, start: int = 0, stop: int | None = None, block: int = 20, run: int = 0):
+        stop, time_zero = len(recording) if stop is None else stop, time_zero_ns(recording)
         for first in range(start, stop, block):
-            self.samples.publish(samples_to_msg(recording, first, min(first + block, stop), run, time_zero_ns(recording)))
+            self.samples.publish(samples_to_msg(recording, first, min(first + block, stop), run, time_zero))
             self.executor.spin_once(timeout_sec=0.01)
 
     def wait_for_ranking(self, number: int, name: str = "diagnosis") -> None:

@@ -2,10 +2,11 @@
 
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
-from crash_msgs.srv import AddEffect, RemoveEffect
+from crash_msgs.srv import AddEffect, GetSamples, RemoveEffect
 from helpers_diagnosis import Stage, hidden_case, joined
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -13,8 +14,9 @@ from crash_estimator.core.diagnosis.diagnosis import Diagnosis, diagnose
 from crash_estimator.core.effects.change import add_effect
 from crash_estimator.nodes.effect_requests import request_of, with_effect
 from crash_replay.bag import time_zero_ns, write_bag
+from crash_replay.qos import STREAM
 from crash_replay.recording import Recording, Test
-from crash_replay.ros_messages import stamp_ns
+from crash_replay.ros_messages import channel_to_msg, channel_type, samples_to_msg, stamp, stamp_ns
 
 SAME = 1e-9  # relative; the node's process multiplies small matrices in one thread, this one maybe in several
 
@@ -46,7 +48,8 @@ class Estimators:
     def __init__(self, stage: Stage):
         self.asked = {"one": [], "two": []}
         for name, asked in self.asked.items():
-            stage.node.create_service(AddEffect, f"{name}/add_effect", lambda q, a, asked=asked: self._on_add(asked, q, a))
+            serve = partial(self._on_add, asked)
+            stage.node.create_service(AddEffect, f"{name}/add_effect", serve)
 
     def _on_add(self, asked: list, request: AddEffect.Request, response: AddEffect.Response) -> AddEffect.Response:
         asked.append(request)
@@ -215,6 +218,36 @@ def test_a_test_that_the_model_does_not_fit_is_one_line(stage, case, capfd):
     stage.send(other, 0, 100)
     said = [line for line in capfd.readouterr().err.splitlines() if "ERROR" in line]
     assert len(said) == 2 and all("nothing is diagnosed on this test" in line for line in said)  # one of each node
+
+
+def test_samples_that_were_missed_are_asked_of_the_replay(stage, case):
+    def send_again(request: GetSamples.Request, response: GetSamples.Response) -> GetSamples.Response:
+        stop = min(request.stop, request.start + 400)  # as much as fits
+        response.samples = samples_to_msg(case[2], request.start, stop, 0, time_zero_ns(case[2]))
+        response.success = True
+        return response
+
+    service = stage.node.create_service(GetSamples, "replay/get_samples", send_again)
+    stage.spin_until(stage.diagnoses[0].asking.client.service_is_ready, "the service is there")
+    stage.send_test(case[2])
+    finals = len(stage.finals())
+    stage.send(case[2], 1000, run=3)  # it came late
+    assert_same(stage.wait_for_finals(finals + 1), diagnose(stage.diagnoses[0].structure, [case[2]]))
+    stage.node.destroy_service(service)
+
+
+def test_rosbag2s_player_feeds_it_too(stage, case):
+    recording, finals = case[2], len(stage.finals())
+    stage.send_test(recording)
+    stage.node.destroy_publisher(stage.samples)
+    channels = recording.test.channels
+    out = [stage.node.create_publisher(channel_type(c), f"channels/{c.name}", STREAM) for c in channels]
+    stage.spin_until(lambda: all(p.get_subscription_count() == 2 for p in out), "the channels are subscribed to")
+    for time_ns, values in zip(recording.time_ns.tolist(), recording.values.tolist()):
+        for publisher, channel, value in zip(out, channels, values):
+            publisher.publish(channel_to_msg(channel, stamp(time_zero_ns(recording) + time_ns), value))
+        stage.executor.spin_once(timeout_sec=0.0)
+    assert_same(stage.wait_for_finals(finals + 1), diagnose(stage.diagnoses[0].structure, [recording]))
 
 
 def test_a_request_carries_all_that_was_found(case):

@@ -41,7 +41,8 @@ def misfit_table(windows: Sequence[MisfitWindow], title: str) -> str:
 def ranking_table(ranking: Sequence[Ranked]) -> str:
     """The best candidates of the first round; "?": screened only, its evidence is an estimate."""
     rows = [_row(ranked) for ranked in ranking[:SHOWN]]
-    return table(("candidate", "coefficient", "sigma", "unit", "evidence", "explained", "not told from"), rows) if rows else ""
+    head = ("candidate", "coefficient", "sigma", "unit", "evidence", "explained", "not told from")
+    return table(head, rows) if rows else ""
 
 
 def _row(ranked: Ranked) -> tuple[str, ...]:
@@ -73,7 +74,7 @@ def steps_table(found: Diagnosis) -> str:
 
 
 def revisions_table(found: Diagnosis) -> str:
-    """Error against revision of the model: of the fit, of a free run, against the noise floor, and whether it is white."""
+    """Error against revision of the model: of the fit, over the noise floor, of a free run; and whether it is white."""
     floor = found.residual_rms.noise_floor
     runs = [found.free_run_rms.before, *(step.free_run_rms["after"] for step in found.steps)]
     rows = [

@@ -113,7 +113,8 @@ def signals_of(
 ) -> list[np.ndarray]:
     """What each sensor sees at the instants `time` (n,) from 0 on, without its noise, offset and quantisation.
 
-    history: what happens at these instants, where it is simulated already. What a late sensor sees is simulated at the instants that it sees: to interpolate would smooth every edge.
+    history: what happens at these instants, where it is simulated already. What a late sensor sees is simulated at the
+    instants that it sees: to interpolate would smooth every edge.
     """
     histories = {0.0: simulate(system, time, max_step) if history is None else history}
     signals = []

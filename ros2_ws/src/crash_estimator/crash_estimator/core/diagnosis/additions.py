@@ -2,15 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from difflib import get_close_matches
-from itertools import permutations
 
-from ..effects.base import AttachedBody, ChannelError, Effect, PairSpring, StaticFactor
-from ..structure import EffectSpec, ModelError, Structure
+from ..effects.base import AttachedBody, Effect, StaticFactor
+from ..effects.targets import checked
+from ..structure import EffectSpec, Structure
 from .answer import stated
 from .layout import Addition
+from .model import Model
 from .scales import Scales
-from .search import Model
 
 
 def additions_of(structure: Structure, scales: Scales, effects: Mapping[str, Effect]) -> tuple[Addition, ...]:
@@ -19,21 +18,7 @@ def additions_of(structure: Structure, scales: Scales, effects: Mapping[str, Eff
 
 
 def _addition(structure: Structure, scales: Scales, spec: EffectSpec, effects: Mapping[str, Effect]) -> Addition:
-    if spec.type not in effects:
-        near = get_close_matches(spec.type, effects, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else f"; there are {', '.join(effects)}"
-        raise ModelError(f"model {structure.name}: there is no effect {spec.type!r}{hint}")
-    effect = effects[spec.type]
-    targets = possible_targets(structure, scales, effect)
-    if spec.target not in targets:
-        raise ModelError(
-            f"model {structure.name}: effect {spec.type} cannot act on {spec.target!r}; "
-            f"it needs {'a' if key_of(effect) != 'element' else 'an'} {NOUN[key_of(effect)]}: {', '.join(targets) or 'there is none'}"
-        )
-    unknown = [name for name in spec.shape if name not in effect.shapes]
-    if unknown:
-        known = ", ".join(effect.shapes) or "none"
-        raise ModelError(f"model {structure.name}: effect {spec.type} has no shape constant {unknown[0]!r}; it has {known}")
+    effect = checked(structure, spec, effects, scales.records[0].test)
     shapes = {
         name: shape.starts[len(shape.starts) // 2] * (scales.largest_crush(spec.target) if shape.of_crush else 1.0)
         for name, shape in effect.shapes.items()
@@ -60,30 +45,3 @@ def structure_with(structure: Structure, model: Model, present: int) -> Structur
             )  # fmt: skip
         )
     return replace(structure, effects=(*structure.effects, *added))
-
-
-NOUN = {"element": "element", "body": "free body", "channel": "channel", "between": "pair of bodies"}
-
-
-def possible_targets(structure: Structure, scales: Scales, effect: Effect) -> list[str]:
-    """What an effect of this kind can act on."""
-    match key_of(effect):
-        case "element":
-            return [element.name for element in structure.elements]
-        case "body":
-            return [body.name for body in structure.bodies if body.free]
-        case "between":
-            return [f"{a.name}-{b.name}" for a, b in permutations(structure.bodies, 2) if a.free or b.free]
-    used = [name for body in structure.bodies for name in (*body.acceleration, body.force) if name]
-    if isinstance(effect, ChannelError):
-        return used
-    return [c.name for c in scales.records[0].test.channels if c.quantity == "acceleration" and c.name not in used]
-
-
-def key_of(effect: Effect) -> str:
-    """What the target is called in a model file."""
-    if isinstance(effect, PairSpring):
-        return "between"
-    if isinstance(effect, (AttachedBody, ChannelError)):
-        return "channel"
-    return "body" if type(effect).__name__ in ("BodyInertia", "BodyForce") else "element"

@@ -1,21 +1,33 @@
 """The ranking and the steps of a diagnosis, in the terms of its contract."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+
+from crash_replay.conditioning import cfc_filter
 
 from ..effects.base import StaticFactor
 from .assess import Left, assess, noise_floor
 from .fit import Fit
 from .layout import Layout, Place
+from .linearise import balance_of
+from .model import Model
 from .records import Record
-from .search import GAIN, Model, Round, Tried
+from .search import Round
+from .trying import GAIN, Tried
 
 CONFOUNDED = 6.0
 """Nats: evidences closer than this do not tell two candidates apart."""
 
-BALANCE_WINDOW = 4e-3
-"""s: means over it keep what CFC 60 keeps, the band in which the forces on a barrier and inertias are compared."""
+CFC = 60
+"""The band in which the forces on a barrier and inertias are compared (SAE J211: the motion of a whole structure) ..."""
+
+ACTS = 0.05
+"""... while the force is above this share of its peak."""
+
+SLOWEST = 10.0 * CFC
+"""Samples in a second that the filter needs."""
 
 
 @dataclass(frozen=True)
@@ -95,11 +107,8 @@ def ranking_of(round_: Round, recordings: int) -> tuple[Ranked, ...]:
 
 def _ranked(tried: Tried, round_: Round, shown: list[Tried]) -> Ranked:
     effect, target = tried.addition.key
-    rivals = tuple(
-        " on ".join(other.addition.key)
-        for other in shown
-        if other is not tried and other.fit and tried.fit and tried.gain > GAIN and abs(other.gain - tried.gain) < CONFOUNDED
-    )
+    fitted = [other for other in shown if other is not tried and other.fit] if tried.fit and tried.gain > GAIN else []
+    rivals = tuple(" on ".join(other.addition.key) for other in fitted if abs(other.gain - tried.gain) < CONFOUNDED)
     before = round_.before.fit.cost
     if tried.fit is None:
         explained = min(max(2.0 * tried.gain / before, 0.0), 1.0)
@@ -119,10 +128,13 @@ def _ranked(tried: Tried, round_: Round, shown: list[Tried]) -> Ranked:
     )  # fmt: skip
 
 
-def step_of(round_: Round, before: Model, after: Model, free_run: tuple[float, float]) -> StepReport:
-    """free_run: RMS of the two models' free runs."""
+def step_of(round_: Round, before: Model, after: Model, free_run: tuple[float, float], final: Model) -> StepReport:
+    """free_run: RMS of the two models' free runs; final: the model with all that was added."""
     tried = round_.tried[0]
-    value, std, shape = stated(place_of(after.fit.layout, tried), after.fit)
+    # the last model knows best; but where the noise had to be taken larger, it is the round's own fit that is honest
+    tempered = final.records[0].mix is not None and round_.before.records[0].mix is not None
+    fitted = tried.fit if tempered else final.fit
+    value, std, shape = stated(place_of(fitted.layout, tried), fitted)
     floor = noise_floor(before.fit.layout, before.records)
     return StepReport(
         *tried.addition.key, value, std, tried.addition.effect.unit, float(tried.gain),
@@ -130,34 +142,34 @@ def step_of(round_: Round, before: Model, after: Model, free_run: tuple[float, f
         shape=shape,
         residual_rms={"before": before.left.rms, "after": after.left.rms, "noise_floor": floor, "unit": "m/s^2"},
         free_run_rms={"before": free_run[0], "after": free_run[1]},
-        force_explained=_force_explained(before, after),
+        force_explained=_force_explained(round_.before.fit, fitted if tempered else after.fit, before.records),
     )  # fmt: skip
 
 
-def _force_explained(before: Model, after: Model) -> dict[str, dict]:
-    """Share of each measured force's variance that the measured accelerations of all masses explain."""
-    found = {}
-    layout = before.fit.layout
+def _force_explained(before: Fit, after: Fit, records: Sequence[Record]) -> dict[str, dict]:
+    """Share of the measured force's variance that the measured accelerations of all masses explain."""
+    layout = before.layout
     fixed = [q for q, output in enumerate(layout.outputs) if output.fixed]
-    free = [output.body for output in layout.outputs if not output.fixed]
-    every = [k for k, body in enumerate(layout.structure.bodies) if body.free]
-    if len(fixed) != 1 or set(free) != set(every):
-        return found
-    shares = [[_balance(model, record, r, fixed[0]) for r, record in enumerate(model.records)] for model in (before, after)]
-    found[layout.outputs[fixed[0]].channel] = {"before": float(np.mean(shares[0])), "after": float(np.mean(shares[1]))}
-    return found
+    measured = {output.body for output in layout.outputs if not output.fixed}
+    if len(fixed) != 1 or measured != {k for k, body in enumerate(layout.structure.bodies) if body.free}:
+        return {}
+    periods = [float(np.median(np.diff(record.time[record.at]))) for record in records]
+    if max(periods) * SLOWEST > 1.0:
+        return {}
+    before_, after_ = (
+        float(np.mean([_balance(fit, record, fixed[0], period) for record, period in zip(records, periods)]))
+        for fit in (before, after)
+    )
+    return {layout.outputs[fixed[0]].channel: {"before": before_, "after": after_}}
 
 
-def _balance(model: Model, record: Record, r: int, row: int) -> float:
-    """1 - var(F + sum M a) / var(F), in means over a short window."""
-    from .linearise import balance_of  # noqa: PLC0415
-
-    force = record.measured[:, row]
-    predicted = balance_of(model.fit.layout, record, model.fit.theta)[record.at]
-    length = max(int(round(BALANCE_WINDOW / float(np.median(np.diff(record.time[record.at]))))), 1)
-    window = np.full(length, 1.0 / length)
-    smooth = [np.convolve(np.nan_to_num(x), window, "same") for x in (force, force - predicted)]
-    return float(1.0 - np.var(smooth[1]) / np.var(smooth[0]))
+def _balance(fitted: Fit, record: Record, row: int, period: float) -> float:
+    """1 - var(F + sum M a) / var(F), below CFC 60, while the force acts."""
+    force = np.nan_to_num(record.measured[:, row])
+    predicted = balance_of(fitted.layout, record, fitted.theta)[record.at]
+    force, left = cfc_filter(force, period, CFC), cfc_filter(force - predicted, period, CFC)
+    acts = np.abs(force) > ACTS * np.abs(force).max()
+    return max(float(1.0 - np.var(left[acts]) / np.var(force[acts])), 0.0)
 
 
 __all__ = ["Left", "Ranked", "StepReport", "ranking_of", "stated", "step_of"]

@@ -7,8 +7,9 @@ import numpy as np
 
 from .fit import Fit, advance
 from .layout import Layout
-from .linearise import linearise, motion_of, predicted
+from .linearise import linearise, predicted
 from .linkforce import LinkForce
+from .motion import motion_of
 from .records import Record
 from .trajectory import Trajectory
 from .whiteness import Whiteness, whiteness
@@ -59,7 +60,8 @@ def _left(layout: Layout, records: Sequence[Record], theta: np.ndarray, trajecto
         residuals.append(np.where(record.valid[record.at] > 0.0, record.measured - output, np.nan))
         links.append(equations.links)
     whitened = [residual / record.noise for residual, record in zip(residuals, records)]
-    white = whiteness(whitened, [r.noise_samples for r in records], [float(np.median(np.diff(r.time[r.at]))) for r in records])
+    periods = [float(np.median(np.diff(record.time[record.at]))) for record in records]
+    white = whiteness(whitened, [record.noise_samples for record in records], periods)
     cost = float(np.nanmean(np.concatenate([w.ravel() for w in whitened]) ** 2))
     return Left(tuple(outputs), tuple(residuals), tuple(links), white, rms(layout, residuals), cost)
 

@@ -36,7 +36,19 @@ def candidates(
     """Every admissible addition, several with the same effect and target where the search has several starts."""
     taken = {addition.key for addition in present}
     found = [a for effect in effects.values() for a in _on_targets(structure, scales, effect)]
-    return [addition for addition in found if addition.key not in taken]
+    sensed = {_carrier(scales, addition.target) for addition in present if isinstance(addition.effect, AttachedBody)}
+    return [
+        addition
+        for addition in found
+        if addition.key not in taken
+        and not (isinstance(addition.effect, AttachedBody) and _carrier(scales, addition.target) in sensed)
+    ]
+
+
+def _carrier(scales: Scales, channel: str) -> str:
+    """The body that a channel's sensor sits on: with two sensors it is still one body."""
+    test = scales.records[0].test
+    return test.channels[test.index(channel)].body or channel
 
 
 def _on_targets(structure: Structure, scales: Scales, effect: Effect) -> Iterator[Addition]:

@@ -12,9 +12,10 @@ from .additions import additions_of, structure_with
 from .answer import Ranked, StepReport, ranking_of, step_of
 from .assess import free_run, noise_floor
 from .misfit import MisfitWindow, misfit_windows
+from .model import Model, fit_model
 from .records import make_record
 from .scales import make_scales
-from .search import LEAST_SHARE, Model, Round, fit_model, search, share_removed
+from .search import LEAST_SHARE, Round, search, share_removed
 
 CELLS = 36
 """Of a free curve over its crush scale."""
@@ -79,7 +80,7 @@ def diagnose(
     if not final.left.whiteness.white and final.left.cost < NEAR_THE_FLOOR:
         finer = make_scales(structure, records, FINER_CELLS)
         refined = fit_model(structure, records, finer, final.additions)
-        if refined.left.whiteness.white or share_removed(final, refined) > LEAST_SHARE:
+        if refined.left.whiteness.white or share_removed(final.left, refined.left) > LEAST_SHARE:
             finer_rounds, finer_final = search(records, finer, effects, present)
             if finer_final.left.whiteness.white:
                 rounds, final = finer_rounds, finer_final
@@ -93,7 +94,7 @@ def _answer(structure: Structure, rounds: list[Round], final: Model, present: in
         models = (*models, final)
     added = final.additions[present:]
     runs = [free_run(model.fit, model.records).rms for model in models]
-    steps = tuple(step_of(*each) for each in zip(rounds, models, models[1:], zip(runs, runs[1:])))[: len(added)]
+    steps = tuple(step_of(*each, final) for each in zip(rounds, models, models[1:], zip(runs, runs[1:])))[: len(added)]
     white = final.left.whiteness.white
     verdict = ("effect_missing" if added else "adequate") if white else "unexplained"
     floor = noise_floor(first.fit.layout, first.records)
@@ -117,7 +118,8 @@ def _text(verdict: str, steps, ranking, first: Model, final: Model, floor: float
     names = ", ".join(f"{step.effect} on {step.target}" for step in steps)
     size = f"residual RMS {first.left.rms:.3g} -> {final.left.rms:.3g} m/s^2, noise floor {floor:.3g}"
     if verdict == "adequate":
-        return f"adequate: nothing significant is missing (residual RMS {final.left.rms:.3g} m/s^2, noise floor {floor:.3g})"
+        left = f"residual RMS {final.left.rms:.3g} m/s^2, noise floor {floor:.3g}"
+        return f"adequate: nothing significant is missing ({left})"
     if verdict == "effect_missing":
         advice = ""
         rivals = ranking[0].confounded_with if ranking else ()

@@ -14,18 +14,12 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, solve_triangular
 
 from .layout import Layout
-from .linearise import Equations, linearise, measured_motion, motion_of, predicted
-from .propagate import FREE, propagate
+from .linearise import Equations
+from .motion import measured_motion, motion_of
+from .normal import FREE_RUN, Normal, Stage, may_diverge, normal_equations
+from .propagate import propagate
 from .records import Record
 from .trajectory import Trajectory
-
-NO_TRACE = np.zeros((0, 0))
-
-
-class Stage(NamedTuple):
-    pull: float  # 1/s, observer
-    inflate: float  # factor on the noise
-    blur: float  # steps of time in which contact opens and closes
 
 
 FADE = (Stage(200.0, 30.0, 16.0), Stage(80.0, 10.0, 8.0), Stage(30.0, 3.0, 4.0), Stage(0.0, 1.0, 2.0))
@@ -39,7 +33,6 @@ REFINE = (Stage(0.0, 2.0, 6.0), Stage(0.0, 1.0, 2.0))
 SLOWLY = tuple(Stage(0.0, 1.0, blur) for blur in (8.0, 8.0, 8.0, 4.0, 4.0, 4.0, 2.0, 2.0, 2.0))
 """Stages where a force that jumps at separation has stopped a fit short."""
 
-FREE_RUN = Stage(0.0, 1.0, 1.0)
 
 MOST_ITERATIONS = 20
 LEAST = 6
@@ -56,15 +49,6 @@ COARSE = 1e-3
 
 RIDGE = 1e-8
 """Share of a parameter's own precision."""
-
-
-class Normal(NamedTuple):
-    """Whitened residual and its derivative at one parameter vector, summed up: cost(d) = c - 2 b d + d A d."""
-
-    matrix: np.ndarray  # (p, p)
-    vector: np.ndarray  # (p,)
-    cost: float  # sum of squares of the whitened residual
-    samples: int
 
 
 class Step(NamedTuple):
@@ -88,59 +72,7 @@ class Fit(NamedTuple):
     iterations: int
 
 
-def normal_equations(
-    layout: Layout, records: Sequence[Record], theta, trajectories, follow: bool = True, switched=(), stage: Stage = FREE_RUN
-) -> tuple[Normal, list[Equations]]:
-    """follow=False leaves out that the motion changes with the forces: the equation error on the given motion."""
-    size = layout.size + len(switched)
-    matrix, vector = np.zeros((size, size)), np.zeros(size)
-    cost, samples, every = 0.0, 0, []
-    for r, (record, trajectory) in enumerate(zip(records, trajectories)):
-        target = measured_motion(layout, record, r, theta) if stage.pull else None
-        equations = linearise(layout, record, r, theta, trajectory, switched, stage.pull, target, stage.blur)
-        if not follow:
-            still = np.zeros_like(equations.linear.kx)
-            equations = equations._replace(linear=equations.linear._replace(kx=still, kv=still, kp=still))
-        residual, jacobian = _outputs(layout, record, r, theta, trajectory, equations, target)
-        flat = jacobian.reshape(-1, jacobian.shape[-1])
-        c = equations.columns
-        matrix[np.ix_(c, c)] += flat.T @ flat
-        vector[c] += flat.T @ residual.ravel()
-        cost += float(residual.ravel() @ residual.ravel())
-        samples += residual.size
-        every.append(equations)
-    return Normal(matrix, vector, cost, samples), every
-
-
-def _outputs(layout, record, r, theta, trajectory, equations, target) -> tuple[np.ndarray, np.ndarray]:
-    """Whitened binned residual (bins, q) corrected for the defect, and its derivative (bins, q, columns)."""
-    out = np.zeros((record.bins, len(layout.outputs), 1 + len(equations.columns)))
-    propagate(equations.linear, layout.knots, equations.sampling, out, NO_TRACE)
-    # what acts on outputs only is linearised at the forces' prediction: the measured motion itself is noisy
-    by = predicted(layout, record, r, theta, equations.rows)[1]
-    weight = equations.sampling.weight
-    position = {int(p): j + 1 for j, p in enumerate(equations.columns)}
-    for q, parameter, column in by:
-        out[:, q, position[parameter]] += _binned(record, weight[:, q] * column)
-    # along the trajectory: the free bodies' own acceleration less the observer's; fixed forces are in column 0
-    along = np.where(layout.kind == FREE, trajectory.a, 0.0)
-    if target is not None:
-        pull = equations.linear.pull
-        push = pull**2 * (trajectory.x - target.x) + 2.0 * pull * (trajectory.v - target.v)
-        along += np.where(layout.kind == FREE, push, 0.0)
-    misfit = np.zeros((len(record.time), len(layout.outputs)))
-    misfit[record.at] = np.nan_to_num(record.measured - predicted(layout, record, r, theta, along)[0][record.at])
-    residual = np.stack([_binned(record, weight[:, q] * misfit[:, q]) for q in range(len(layout.outputs))], axis=1)
-    residual, jacobian = residual - out[:, :, 0], out[:, :, 1:]
-    if record.mix is not None:
-        residual, jacobian = residual @ record.mix.T, record.mix @ jacobian
-    return residual, jacobian
-
-
-def _binned(record: Record, values: np.ndarray) -> np.ndarray:
-    return np.bincount(record.bin[record.at], weights=values[record.at], minlength=record.bins)
-
-
+@may_diverge
 def solve(layout: Layout, normal: Normal, theta: np.ndarray, inflate: float = 1.0, held: np.ndarray | None = None) -> Step:
     """Minimum of the quadratic model with the prior, inside the limits (an active set).
 
@@ -148,10 +80,10 @@ def solve(layout: Layout, normal: Normal, theta: np.ndarray, inflate: float = 1.
     """
     prior, weight = layout.prior, 1.0 / inflate**2
     matrix = weight * normal.matrix + prior.precision
-    if not np.isfinite(matrix).all():
-        raise LinAlgError("the simulation diverged")
     off = theta - prior.mean
     vector = weight * normal.vector - prior.precision @ off
+    if not (np.isfinite(matrix).all() and np.isfinite(vector).all()):
+        raise LinAlgError("the simulation diverged")
     before = weight * normal.cost + float(off @ prior.precision @ off)
     scale = 1.0 / np.sqrt(np.diagonal(matrix))
     low, high = prior.low - theta, prior.high - theta
@@ -180,6 +112,7 @@ def _cholesky(matrix: np.ndarray) -> tuple[np.ndarray, bool]:
         return cho_factor(matrix + RIDGE * np.eye(len(matrix)), lower=True, check_finite=False)
 
 
+@may_diverge
 def advance(
     layout: Layout, record: Record, r: int, theta, delta, trajectory: Trajectory, equations: Equations
 ) -> Trajectory:

@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..effects.base import AttachedBody, Effect, PairSpring, UnloadingSlope
+from ..effects.base import AttachedBody, Effect, ElementForce, Gap, PairSpring, StaticFactor, UnloadingSlope
 from ..structure import Coefficient, Structure
-from .curves import ROUGHNESS, Curve, make_knots, prior_precision
+from .builder import Builder, Prior
+from .curves import ROUGHNESS, Curve, make_knots
 from .propagate import DRIVEN, FIXED, FREE
 from .records import Record, outputs_of
 from .pairs import pair_of
@@ -77,13 +78,6 @@ class Link:
     trial: float = 0.0  # gap or slope of a law that is only tried out
 
 
-class Prior(NamedTuple):
-    mean: np.ndarray  # (p,)
-    precision: np.ndarray  # (p, p)
-    low: np.ndarray  # (p,)
-    high: np.ndarray  # (p,)
-
-
 class Layout(NamedTuple):
     """A fit's parameters and what they mean."""
 
@@ -104,50 +98,13 @@ class Layout(NamedTuple):
     names: tuple[str, ...]  # of the common parameters after the knots
 
 
-class _Builder:
-    """Collects parameters one by one."""
-
-    def __init__(self):
-        self.mean: list[float] = []
-        self.std: list[float] = []
-        self.low: list[float] = []
-        self.high: list[float] = []
-        self.start: list[float] = []
-        self.names: list[str] = []
-        self.blocks: list[tuple[np.ndarray, np.ndarray]] = []
-
-    def add(self, name: str, start: float, std: float, mean=0.0, low=-np.inf, high=np.inf) -> int:
-        for column, item in zip(
-            (self.names, self.start, self.std, self.mean, self.low, self.high), (name, start, std, mean, low, high)
-        ):
-            column.append(item)
-        return len(self.start) - 1
-
-    def curve(
-        self, name: str, knots: np.ndarray, crush: float, force: float, roughness: np.ndarray | float, start: float = 1.0
-    ) -> Curve:
-        """start: share of the straight line to the force scale that it begins with."""
-        inner = knots != 0.0
-        column = np.full(len(knots), -1)
-        column[inner] = [self.add(name, start * force * x / crush, np.inf) for x in knots[inner]]
-        precision = prior_precision(knots, crush, force, roughness)
-        self.blocks.append((column[inner], precision[np.ix_(inner, inner)]))
-        return Curve(knots, column, crush, force)
-
-    def prior(self) -> Prior:
-        precision = np.diag(1.0 / np.array(self.std) ** 2)
-        for columns, block in self.blocks:
-            precision[np.ix_(columns, columns)] += block
-        return Prior(np.array(self.mean), precision, np.array(self.low), np.array(self.high))
-
-
 def make_layout(
     structure: Structure, records: Sequence[Record], scales: Scales, additions: Sequence[Addition],
     roughness: Mapping[str, np.ndarray] | None = None,
 ) -> Layout:  # fmt: skip
     """roughness: of curves, by their link's name, where it is not the usual one (`curves.adapted_roughness`)."""
     roughness = roughness or {}
-    b = _Builder()
+    b = Builder()
     index = structure.body_index
     bodies = [body.name for body in structure.bodies]
     kind = [FREE if body.free else DRIVEN if body.driven else FIXED for body in structure.bodies]
@@ -165,7 +122,9 @@ def make_layout(
             if addition.touches:
                 knots, crush = scales.touching(addition)
                 force = scales.host_force(addition)
-                touching.append((addition, b.curve(_touch_name(addition), knots, crush, force, roughness.get(_touch_name(addition), ROUGHNESS), 0.0)))
+                name = _touch_name(addition)
+                curve = b.curve(name, knots, crush, force, roughness.get(name, ROUGHNESS), 0.0)
+                touching.append((addition, curve))
     knots = len(b.start)
     links, places = [], []
     for k, element in enumerate(structure.elements):
@@ -204,7 +163,7 @@ def _touch_name(addition: Addition) -> str:
     return f"{addition.touches}-{addition.target}"
 
 
-def _element_curve(b: _Builder, k: int, element, scales: Scales, roughness: Mapping[str, np.ndarray]) -> Curve:
+def _element_curve(b: Builder, k: int, element, scales: Scales, roughness: Mapping[str, np.ndarray]) -> Curve:
     low, high = scales.crush_range[k]
     crush = scales.crush[k]
     one_way = not element.tension
@@ -212,7 +171,7 @@ def _element_curve(b: _Builder, k: int, element, scales: Scales, roughness: Mapp
     return b.curve(element.name, knots, crush, scales.force[k], roughness.get(element.name, ROUGHNESS))
 
 
-def _constant(b: _Builder, name: str, coefficient: Coefficient, std: float) -> int:
+def _constant(b: Builder, name: str, coefficient: Coefficient, std: float) -> int:
     low, high = coefficient.min, coefficient.max
     return b.add(name, min(max(std * 0.1, low), high), std, low=low, high=high)
 
@@ -220,7 +179,6 @@ def _constant(b: _Builder, name: str, coefficient: Coefficient, std: float) -> i
 def _element_link(b, k, element, index, curve, scales, additions, places) -> Link:
     stiffness, damping = element.stiffness, element.damping
     mine = [a for a in additions if a.target == element.name]
-    kinds = {kind: [a for a in mine if type(a.effect).__name__ == kind] for kind in ("ElementForce", "StaticFactor", "Gap", "UnloadingSlope")}
     constant = rate = None
     if stiffness.estimated and curve is None:
         constant = _constant(b, f"{element.name}.stiffness", stiffness, 3.0 * scales.stiffness[k])
@@ -229,10 +187,10 @@ def _element_link(b, k, element, index, curve, scales, additions, places) -> Lin
     here = {id(a): _place(b, a, scales) for a in mine}
     places += here.values()
 
-    def placed(kind):
-        return tuple(here[id(a)] for a in kinds[kind])
+    def placed(kind: type[Effect]) -> tuple[Place, ...]:
+        return tuple(here[id(a)] for a in mine if isinstance(a.effect, kind))
 
-    gap, slope = placed("Gap"), placed("UnloadingSlope")
+    gap, slope = placed(Gap), placed(UnloadingSlope)
     a, c = (index[end] for end in element.between)
     return Link(
         element.name,
@@ -249,8 +207,8 @@ def _element_link(b, k, element, index, curve, scales, additions, places) -> Lin
         gap=gap[0].coefficient if gap else None,
         displacement=element.displacement,
         velocity=element.velocity,
-        forces=placed("ElementForce"),
-        factors=placed("StaticFactor"),
+        forces=placed(ElementForce),
+        factors=placed(StaticFactor),
     )
 
 
@@ -267,7 +225,7 @@ def _pair_link(b, addition, index, records, scales, places) -> Link:
     )
 
 
-def _place(b: _Builder, addition: Addition, scales: Scales) -> Place:
+def _place(b: Builder, addition: Addition, scales: Scales) -> Place:
     """An effect's parameters: its coefficient, and the logarithms of its shape constants."""
     effect = addition.effect
     std = scales.coefficient(addition)
@@ -286,7 +244,7 @@ def _place(b: _Builder, addition: Addition, scales: Scales) -> Place:
     return Place(addition, coefficient, shapes)
 
 
-def _modes(b: _Builder, structure: Structure, record: Record, attached: dict[str, int]) -> dict[int, int]:
+def _modes(b: Builder, structure: Structure, record: Record, attached: dict[str, int]) -> dict[int, int]:
     """Mean and slow cosines of each driven channel's noise; white noise spreads its variance evenly over them."""
     found = {}
     driven = [(k, body.acceleration) for k, body in enumerate(structure.bodies) if body.driven]

@@ -1,4 +1,4 @@
-"""The equations of motion along a trajectory: what they miss (defect), and how they change with motion and parameters."""
+"""The equations of motion along a trajectory: what they miss (defect), and how motion and parameters change them."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -6,13 +6,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import savgol_coeffs
 
-from ..effects.base import AttachedBody, BodyForce, BodyInertia, ChannelError
-from .layout import DRIVEN_MODES, Layout, Link, Place
+from ..effects.base import AttachedBody, BodyForce, BodyInertia
+from .layout import Layout, Link, Place
 from .linkforce import LinkForce, link_force
+from .motion import distortion, driven_motion, measured_motion
 from .propagate import DRIVEN, FIXED, FREE, Linear, Sampling
 from .records import Record
-from .scales import attached_start
-from .trajectory import Trajectory, integrate, measured_crush
+from .trajectory import Trajectory, measured_crush
 
 
 class Equations(NamedTuple):
@@ -23,67 +23,6 @@ class Equations(NamedTuple):
     rows: np.ndarray  # (g, b) acceleration of free and driven bodies, force on fixed ones, as the forces give them
     columns: np.ndarray  # parameter of each column after the first, (columns - 1,)
     links: list[LinkForce]
-
-
-class Distortion(NamedTuple):
-    """A channel's error: recorded(t) = (1 + gain) true(t - delay) + offset, and its parameters (-1: none)."""
-
-    gain: float = 0.0
-    delay: float = 0.0
-    offset: float = 0.0
-    parameters: tuple[int, int, int] = (-1, -1, -1)
-
-
-def distortion(layout: Layout, theta: np.ndarray, channel: str) -> Distortion:
-    found, parameters = {"gain": 0.0, "delay": 0.0, "offset": 0.0}, {"gain": -1, "delay": -1, "offset": -1}
-    for place in layout.places:
-        if isinstance(place.addition.effect, ChannelError) and place.addition.target == channel:
-            found[place.addition.effect.role] = float(theta[place.coefficient])
-            parameters[place.addition.effect.role] = place.coefficient
-    found["delay"] = max(found["delay"], 0.0)  # at its limit it may be a rounding error below
-    return Distortion(**found, parameters=tuple(parameters.values()))
-
-
-def driven_motion(layout: Layout, record: Record, r: int, theta: np.ndarray):
-    """Acceleration (g, b) of the driven bodies, and its derivatives: a list of (body, parameter, (g,))."""
-    structure = layout.structure
-    g = len(record.time)
-    a, by = np.zeros((g, len(layout.bodies))), []
-    channels = {k: body.acceleration for k, body in enumerate(structure.bodies) if body.driven}
-    channels |= {k: (channel,) for channel, k in layout.attached.items()}
-    end = record.time[-1]
-    cosines = np.cos(np.outer(np.pi * record.time / end, np.arange(DRIVEN_MODES + 1)))
-    for k, names in channels.items():
-        for name in names:
-            d, signal = distortion(layout, theta, name), record.signals[name]
-            share = 1.0 / len(names)
-            after = record.time + d.delay
-            true = (np.interp(after, signal.time, signal.values) - d.offset) / (1.0 + d.gain)
-            a[:, k] += share * true
-            gain, delay, offset = d.parameters
-            if gain >= 0:
-                by.append((k, gain, -share * true / (1.0 + d.gain)))
-            if offset >= 0:
-                by.append((k, offset, np.full(g, -share / (1.0 + d.gain))))
-            if delay >= 0:
-                step = 0.5 * float(np.median(record.dt[1:]))
-                up, down = (np.interp(after + s * step, signal.time, signal.values) for s in (1.0, -1.0))
-                by.append((k, delay, share * (up - down) / (2.0 * step) / (1.0 + d.gain)))
-        first = layout.modes[r][k]
-        a[:, k] += cosines @ theta[first : first + DRIVEN_MODES + 1]
-        by += [(k, first + j, cosines[:, j]) for j in range(DRIVEN_MODES + 1)]
-    return a, by
-
-
-def start_values(layout: Layout, record: Record) -> tuple[np.ndarray, np.ndarray]:
-    """(b,) initial velocities and displacements, attached bodies included."""
-    v0, x0 = list(record.initial_velocity), list(record.initial_displacement)
-    by_channel = {p.addition.target: p.addition for p in layout.places if isinstance(p.addition.effect, AttachedBody)}
-    for channel in layout.attached:
-        x, v = attached_start(layout.structure, record, by_channel[channel])
-        v0.append(v)
-        x0.append(x)
-    return np.array(v0), np.array(x0)
 
 
 def linearise(
@@ -98,7 +37,8 @@ def linearise(
     """
     g, bodies = trajectory.a.shape
     mass, extra_mass = _masses(layout, theta)
-    inverse = np.array([1.0 / m if k == FREE else 1.0 if _measured(layout, b) else 0.0 for b, (k, m) in enumerate(zip(layout.kind, mass))])
+    measured = np.array([_measured(layout, body) for body in range(bodies)], dtype=float)
+    inverse = np.where(layout.kind == FREE, 1.0 / mass, measured)
     inverse[layout.kind == DRIVEN] = 0.0
     external: dict[int, np.ndarray] = {}
 
@@ -129,7 +69,8 @@ def linearise(
     for j, link in enumerate(switched):
         present, (a, c) = forces[numbers[link.name]], link.ends
         crush, rate = _motion(link, record, r, trajectory)
-        change = link_force(link, np.append(theta, link.trial), record.time, blur * _steps(record), crush, rate).force - present.force
+        other = link_force(link, np.append(theta, link.trial), record.time, blur * _steps(record), crush, rate)
+        change = other.force - present.force
         into = external_for(layout.size + j)
         into[:, a] -= change * inverse[a]
         into[:, c] += change * inverse[c]
@@ -213,7 +154,7 @@ def _body_effect(layout, record, place: Place, theta, trajectory, loads, externa
 
 
 SMOOTH = savgol_coeffs(11, 2)
-"""A measured inertia acts with its sensor's noise: a short local parabola takes most of that out, and leaves the signal."""
+"""A measured inertia acts with its sensor's noise: a short local parabola takes most of that out, not the signal."""
 
 
 def _smooth(a: np.ndarray) -> np.ndarray:
@@ -284,22 +225,3 @@ def balance_of(layout: Layout, record: Record, theta: np.ndarray) -> np.ndarray:
     return force
 
 
-def measured_motion(layout: Layout, record: Record, r: int, theta: np.ndarray) -> Trajectory:
-    """What the sensors say of the motion, if they err as theta says."""
-    a = np.zeros((len(record.time), len(layout.bodies)))
-    for k, body in enumerate(layout.structure.bodies):
-        for name in body.acceleration if body.free else ():
-            d, signal = distortion(layout, theta, name), record.signals[name]
-            recorded = np.interp(record.time + d.delay, signal.time, signal.values)
-            a[:, k] += (recorded - d.offset) / (1.0 + d.gain) / len(body.acceleration)
-    return motion_of(layout, record, r, theta, a)
-
-
-def motion_of(layout: Layout, record: Record, r: int, theta: np.ndarray, free: np.ndarray) -> Trajectory:
-    """The trajectory in which free bodies accelerate as given (g, bodies) and driven ones as theta says."""
-    a = driven_motion(layout, record, r, theta)[0]
-    for k in np.flatnonzero(layout.kind == FREE):
-        a[:, k] = free[:, k]
-    v0, x0 = start_values(layout, record)
-    v, x = integrate(record.dt, a, v0, x0)
-    return Trajectory(a, v, x)

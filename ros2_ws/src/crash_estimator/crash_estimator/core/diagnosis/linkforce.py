@@ -104,7 +104,8 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
     if link.gap is not None:
         parameters.append(link.gap)
         columns.append(-np.where(on_line, kx + kp, kx))
-    return LinkForce(force, kx, kv, kp, loading, knot, weight, parameters, columns, open_ == 0.0, on_line if slope is not None else rate < 0.0)
+    unloads = on_line if slope is not None else rate < 0.0
+    return LinkForce(force, kx, kv, kp, loading, knot, weight, parameters, columns, open_ == 0.0, unloads)
 
 
 def _gate(link: Link, x, rate, dt, static, on_line, slope):

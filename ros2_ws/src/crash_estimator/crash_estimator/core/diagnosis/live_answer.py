@@ -62,8 +62,8 @@ def final_answer(found: Diagnosis) -> LiveAnswer:
         white=(first.left.whiteness, last.left.whiteness),
         misfit=misfit_windows(first.fit.layout, first.records[:1], first.left),
         fits=tuple(
-            curves(model.fit.layout, model.records[0], model.left.predicted[0], effects[: len(model.additions) - present])
-            for model in found.models
+            curves(m.fit.layout, m.records[0], m.left.predicted[0], effects[: len(m.additions) - present])
+            for m in found.models
         ),
         final=True,
     )

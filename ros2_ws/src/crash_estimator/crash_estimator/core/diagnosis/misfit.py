@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import chdtri
 
 from ..estimate import ElementState
 from .assess import Left, output_scale
@@ -13,11 +14,8 @@ from .records import Record
 WINDOW = 2e-3
 """s: over which the residual's mean square is taken."""
 
-SIGMAS = 4.0
-"""Band of that mean square, in its own standard deviations."""
-
-LEAST_RATIO = 1.5
-"""And the least mean square, in that of the noise, that counts as leaving the band."""
+SIGNIFICANT = 0.01
+"""Probability that noise alone leaves the band anywhere."""
 
 
 class MisfitWindow(NamedTuple):
@@ -34,6 +32,7 @@ class MisfitWindow(NamedTuple):
 def misfit_windows(layout: Layout, records: Sequence[Record], left: Left) -> tuple[MisfitWindow, ...]:
     """Windows in order of time, record by record."""
     found = []
+    tests = sum(record.measured.size for record in records)
     for r, record in enumerate(records):
         time = record.time[record.at]
         length = max(int(round(WINDOW / float(np.median(np.diff(time))))), 4)
@@ -41,7 +40,7 @@ def misfit_windows(layout: Layout, records: Sequence[Record], left: Left) -> tup
             residual, scale = left.residual[r][:, q], output_scale(layout)[q]
             z2 = np.nan_to_num(residual / record.noise[q]) ** 2
             mean = np.convolve(z2, np.full(length, 1.0 / length), "same")
-            outside = mean > max(LEAST_RATIO, 1.0 + SIGMAS * np.sqrt(2.0 / length))
+            outside = mean > chdtri(length, SIGNIFICANT / tests) / length  # a sum of squares: chi-squared
             for first, last in _runs(outside, length):
                 within = slice(first, last + 1)
                 found.append(

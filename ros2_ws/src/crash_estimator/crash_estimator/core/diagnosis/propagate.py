@@ -50,7 +50,7 @@ class Sampling(NamedTuple):
 FREE, DRIVEN, FIXED = 0, 1, 2
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, fastmath=True, error_model="numpy")
 def propagate(system, knots, sampling, out, trace):
     """Fill out (bins, q, columns), and trace (g, b) with the acceleration of column 0 (empty: not wanted)."""
     g, b, pe = system.extra.shape
@@ -132,7 +132,7 @@ def propagate(system, knots, sampling, out, trace):
                 trace[t, k] = a[k, 0]
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, fastmath=True, error_model="numpy")
 def _external(extra, row, knots, pe):
     row[: knots + 1] = 0.0
     row[0] = extra[0]
@@ -140,7 +140,7 @@ def _external(extra, row, knots, pe):
         row[knots + j] = extra[j]
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, fastmath=True, error_model="numpy")
 def _link_force(system, t, link, x, v, peak, force):
     """Change of the link's force in every column."""
     kx, kv, kp = system.kx[t, link], system.kv[t, link], system.kp[t, link]
@@ -162,7 +162,7 @@ def _link_force(system, t, link, x, v, peak, force):
             force[column] += system.weight[t, link, side]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _implicit(system, t, half, sixth, number, matrix, inverse):
     """Inverse of I - dt^2/6 A_x - dt/2 A_v: what the end of a step feeds back into its own acceleration."""
     matrix[:, :] = 0.0
@@ -200,7 +200,7 @@ def _implicit(system, t, half, sixth, number, matrix, inverse):
                     inverse[m, j] -= factor * inverse[i, j]
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True, fastmath=True, error_model="numpy")
 def _sample(sampling, t, row, out):
     """Add this instant's rows to the bins of the samples that see it, each output with its own lag."""
     for q in range(len(sampling.body)):

@@ -19,9 +19,10 @@ from scipy.linalg import cho_solve
 from scipy.special import log_ndtr
 
 from ..effects.base import Gap, UnloadingSlope
-from .fit import Fit, equation_error_start, normal_equations, solve
+from .fit import Fit, equation_error_start, solve
 from .layout import DRIVEN_MODES, Addition, Layout, Link, make_layout
-from .linearise import motion_of
+from .motion import motion_of
+from .normal import normal_equations
 from .records import Record
 from .scales import Scales
 

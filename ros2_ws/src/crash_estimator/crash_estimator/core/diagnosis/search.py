@@ -1,78 +1,34 @@
-"""The search for what is missing: screen, fit the best candidates, add the best, until nothing is left or nothing helps."""
+"""The search for what is missing: try the candidates, add the best, until nothing is left or nothing helps."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from ..effects.base import AttachedBody, ChannelError, Effect
-from ..structure import Structure
+from ..effects.base import ChannelError, Effect
 from .assess import Left, assess
-from .candidates import candidates, touching
-from .curves import adapted_roughness
-from .fit import MOST_ITERATIONS, REFINE, SLOWLY, Fit, fit
-from .layout import Addition, Layout, make_layout
-from .linearise import motion_of
+from .fit import fit
+from .layout import Addition, make_layout
+from .model import Model, fit_model
+from .motion import motion_of
 from .records import Record
 from .scales import Scales, make_scales
-from .screening import Screened, changes_law, embedding, screen
+from .screening import embedding
 from .temper import tempered
-from .trajectory import Trajectory
-
-GAIN = 6.0
-"""Nats from which a candidate counts as found; below it, the smaller model is preferred."""
+from .trying import GAIN, Tried, try_candidates
 
 SECOND_GAIN = 20.0
 """Nats for one more effect where those found leave white noise already."""
 
-SHORTLIST = 4
-"""Candidates from each of the two screenings that are fitted in full ..."""
-
-LONG_LIST = 10
-"""... and where none of them leaves white noise."""
-
-MOST_HOSTS = 3
-"""Bodies that an unmodelled one is tried on, with a curve to each neighbour."""
-
-SLOW = 3
-"""Candidates that are then fitted on with more care."""
-
 TEMPERINGS = 3
-
-WORTH_FITTING = 1.0
-"""Nats of a screened gain."""
-
-HOPELESS = 400.0
-"""A candidate whose cost stays this far above the best one's is not fitted to the end."""
+"""Times that the noise is taken as large as what the best candidate leaves."""
 
 MOST_STEPS = 4
 
-LEAST_SHARE = 0.3
+LEAST_SHARE = 0.15
 """Of what the model before it leaves above the floor: an addition that removes less of it, and still leaves more than
 noise, is no explanation."""
-
-OFFSET_START = 25.0
-"""m/s^2: an offset bends the measured motion itself, from which fits start."""
-
-
-class Tried(NamedTuple):
-    """A candidate, and the model with it."""
-
-    addition: Addition
-    gain: float  # nats
-    fit: Fit | None  # None: only screened
-    screened: Screened | None
-
-
-class Model(NamedTuple):
-    """The structure with some additions, fitted."""
-
-    additions: tuple[Addition, ...]
-    fit: Fit
-    left: Left
-    roughness: Mapping[str, np.ndarray]
-    records: Sequence[Record]  # with the noise that it was fitted with
 
 
 class Round(NamedTuple):
@@ -84,30 +40,6 @@ class Round(NamedTuple):
     @property
     def best(self) -> Tried | None:
         return self.tried[0] if self.tried and self.tried[0].fit and self.tried[0].gain > GAIN else None
-
-
-def fit_model(
-    structure: Structure, records: Sequence[Record], scales: Scales, additions: Sequence[Addition], start: Fit | None = None
-) -> Model:  # fmt: skip
-    """Fit, then let the curves fold where they were found to bend sharply, and fit again."""
-    layout = make_layout(structure, records, scales, additions)
-    found = fit(layout, records, (start.theta, start.trajectories) if start else None)
-    roughness = {link.name: adapted_roughness(link.curve, found.theta) for link in layout.links if link.curve is not None}
-    if roughness and np.isfinite(found.cost):
-        layout = make_layout(structure, records, scales, additions, roughness)
-        found = fit(layout, records, (found.theta, found.trajectories))
-    left = assess(found, records)
-    if forces_jump(layout) and not left.whiteness.white and records[0].mix is None:
-        slower = fit(layout, records, (found.theta, found.trajectories), refine=SLOWLY, most=2 * MOST_ITERATIONS)
-        if slower.evidence > found.evidence:
-            found, left = slower, assess(slower, records)
-    return Model(tuple(additions), found, left, roughness, records)
-
-
-def forces_jump(layout: Layout) -> bool:
-    """Whether some force ends at separation other than by falling to zero."""
-    one_way = [link for link in layout.links if not link.tension]
-    return any(link.forces or link.damping is not None or link.known_damping for link in one_way)
 
 
 def search(
@@ -122,7 +54,7 @@ def search(
         enough = SECOND_GAIN if model.additions[len(present) :] and model.left.whiteness.white else GAIN
         if done.best is None or done.best.gain < enough or len(rounds) > MOST_STEPS:
             # where the noise had to be taken larger, the model before the round is the one fitted with it
-            return rounds, done.before
+            return without_the_superseded(records, scales, rounds, done.before, len(present))
         fair = _without(scales, model, done.best)
         if fair.fit.evidence > model.fit.evidence + 1.0 and done.before is model:
             # the candidate's fit has shown a better one of the model without it
@@ -134,14 +66,45 @@ def search(
             # the measured motion was wrong, and with it the crushes that the curves reach over
             scales, start = make_scales(scales.structure, records, scales.cells, start.trajectories), None
         larger = fit_model(scales.structure, records, scales, additions, start)
-        if not larger.left.whiteness.white and share_removed(model, larger) < LEAST_SHARE:
+        removed = max(share_removed(done.before.left, left) for left in (larger.left, assess(done.best.fit, records)))
+        if not larger.left.whiteness.white and removed < LEAST_SHARE:
             return rounds, done.before
         model = larger
 
 
-def share_removed(before: Model, after: Model) -> float:
+def without_the_superseded(
+    records: Sequence[Record], scales: Scales, rounds: list[Round], final: Model, present: int
+) -> tuple[list[Round], Model]:
+    """An effect added first may have stood for one that was found later: what the evidence can spare goes again."""
+    number = present
+    while final.left.whiteness.white and number < len(final.additions) - 1:
+        fewer = final.additions[:number] + final.additions[number + 1 :]
+        smaller = _refitted(scales, records, fewer, final)
+        if not smaller.left.whiteness.white or smaller.fit.evidence < final.fit.evidence - GAIN:
+            number += 1
+            continue
+        kept = rounds[: number - present] + rounds[number - present + 1 :]
+        models = [_refitted(scales, records, fewer[: present + k], final) for k in range(len(kept) - 1)] + [smaller]
+        gains = [b.fit.evidence - a.fit.evidence for a, b in zip(models, models[1:])] + [None]
+        rounds = [_round_again(*each) for each in zip(kept, models, gains)]
+        final = smaller
+    return rounds, final
+
+
+def _refitted(scales: Scales, records: Sequence[Record], additions: Sequence[Addition], like: Model) -> Model:
+    """Fitted with the other model's hyperparameters, so that evidences compare."""
+    found = fit(make_layout(scales.structure, records, scales, additions, like.roughness), records)
+    return Model(tuple(additions), found, assess(found, records), like.roughness, records)
+
+
+def _round_again(round_: Round, before: Model, gain: float | None) -> Round:
+    best, *others = round_.tried
+    return Round(before, [best if gain is None else best._replace(gain=gain), *others])
+
+
+def share_removed(before: Left, after: Left) -> float:
     """Of the mean square residual above that of the noise."""
-    return (before.left.cost - after.left.cost) / max(before.left.cost - 1.0, 1e-9)
+    return (before.cost - after.cost) / max(before.cost - 1.0, 1e-9)
 
 
 def as_found(tried: Tried) -> Addition:
@@ -156,7 +119,8 @@ def _without(scales: Scales, model: Model, tried: Tried) -> Model:
     """The model refitted from where a candidate's fit has ended."""
     layout, wide = model.fit.layout, tried.fit.layout
     theta = tried.fit.theta[embedding(layout, wide)]
-    motions = [motion_of(layout, rec, r, theta, t.a) for r, (rec, t) in enumerate(zip(model.records, tried.fit.trajectories))]
+    along = enumerate(zip(model.records, tried.fit.trajectories))
+    motions = [motion_of(layout, record, r, theta, trajectory.a) for r, (record, trajectory) in along]
     found = fit(layout, model.records, (theta, motions))
     return model._replace(fit=found, left=assess(found, model.records))
 
@@ -175,122 +139,3 @@ def one_round(records: Sequence[Record], scales: Scales, effects: Mapping[str, E
     return done
 
 
-def try_candidates(
-    records: Sequence[Record], scales: Scales, effects: Mapping[str, Effect], model: Model, thorough: bool = False
-) -> list[Tried]:
-    """All candidates for one more addition, best first; one for each effect and target.
-
-    thorough: try more of them, and harder, where none of the most likely ones leaves white noise.
-    """
-    additions = candidates(scales.structure, scales, effects, model.additions)
-    by_fit = screen(records, scales, model.additions, additions, model.roughness, model.fit)
-    by_motion = [] if model.left.whiteness.white else screen(records, scales, model.additions, additions, model.roughness)
-    worth = [one for one in by_fit if one.gain > WORTH_FITTING]
-    search = _Search(records, scales, model, by_fit)
-    search.from_motion(shortlist(by_motion, SHORTLIST))
-    search.from_model(shortlist(worth, SHORTLIST))
-    if thorough and not model.left.whiteness.white:
-        offsets = [a for a in additions if isinstance(a.effect, ChannelError) and a.effect.role == "offset"]
-        shifted = [replace(a, coefficient=sign * OFFSET_START) for a in offsets for sign in (-1.0, 1.0)]
-        for harder in (
-            search.slowly,
-            lambda: search.from_model(shortlist(by_motion, SHORTLIST) + shortlist(worth, LONG_LIST)),
-            lambda: search.from_motion(shortlist(worth, SHORTLIST) + shortlist(by_motion, LONG_LIST)),
-            lambda: search.from_motion([Screened(a, 0.0, a.coefficient, 1.0) for a in shifted]),
-            search.slowly,
-        ):
-            if search.reached_the_floor():
-                break
-            harder()
-    return search.ranking()
-
-
-class _Search:
-    """Candidates of one round, the best start of each effect and target."""
-
-    def __init__(self, records: Sequence[Record], scales: Scales, model: Model, screened: Sequence[Screened]):
-        self.records, self.scales, self.model = records, scales, model
-        self.screened = screened
-        self.least = model.fit.cost
-        self.done: set[tuple[int, bool]] = set()
-        self.found: dict[tuple[str, str], Tried] = {}
-        for one in screened:
-            self.found.setdefault(one.addition.key, Tried(one.addition, one.gain, None, one))
-
-    def from_motion(self, chosen: Iterable[Screened]) -> None:
-        """Fit candidates from the measured motion."""
-        for one in chosen:
-            self._fit(one.addition, None)
-            if isinstance(one.addition.effect, AttachedBody):
-                self._touching(one.addition)
-
-    def from_model(self, chosen: Iterable[Screened]) -> None:
-        """Fit candidates from the fit of the model without them."""
-        for one in chosen:
-            self._fit(one.addition, one)
-
-    def _touching(self, addition: Addition) -> None:
-        """What an unmodelled body pushes: the body that takes the rest of its balance may be any of those it may touch."""
-        hosts: dict[str, Addition] = {addition.host: addition}
-        for one in self.screened:
-            if one.addition.key == addition.key:
-                hosts.setdefault(one.addition.host, one.addition)
-        for host in list(hosts.values())[:MOST_HOSTS]:
-            for variant in touching(self.scales.structure, host):
-                self._fit(variant, None)
-
-    def slowly(self) -> None:
-        """Fit the best ones on, with care for forces that jump."""
-        for tried in [t for t in self.ranking() if t.fit][:SLOW]:
-            start = tried.fit.theta, tried.fit.trajectories
-            self._note(tried.addition, fit(tried.fit.layout, self.records, start, refine=SLOWLY, most=2 * MOST_ITERATIONS))
-
-    def _fit(self, addition: Addition, screened: Screened | None) -> None:
-        if (id(addition), screened is None) in self.done:
-            return
-        self.done.add((id(addition), screened is None))
-        model, scales = self.model, self.scales
-        layout = make_layout(scales.structure, self.records, scales, [*model.additions, addition], model.roughness)
-        start = self._start(layout, addition, screened) if screened else None
-        self._note(addition, fit(layout, self.records, start, self.least + HOPELESS, refine=REFINE))
-
-    def _note(self, addition: Addition, found: Fit) -> None:
-        self.least = min(self.least, found.cost)
-        gain = found.evidence - self.model.fit.evidence
-        before = self.found.get(addition.key)
-        if before is None or before.fit is None or gain > before.gain:
-            self.found[addition.key] = Tried(addition, gain, found, None)
-
-    def _start(self, layout: Layout, addition: Addition, screened: Screened) -> tuple[np.ndarray, list[Trajectory]]:
-        theta = layout.start.copy()
-        theta[embedding(self.model.fit.layout, layout)] = self.model.fit.theta
-        if not changes_law(addition):
-            place = next(place for place in layout.places if place.addition is addition)
-            theta[place.coefficient] = screened.coefficient
-        motions = [
-            motion_of(layout, record, r, theta, trajectory.a)
-            for r, (record, trajectory) in enumerate(zip(self.records, self.model.fit.trajectories))
-        ]
-        return theta, motions
-
-    def reached_the_floor(self) -> bool:
-        """The best so far leaves nothing but noise."""
-        best = self.ranking()[0]
-        return best.fit is not None and best.gain > GAIN and assess(best.fit, self.records).whiteness.white
-
-    def ranking(self) -> list[Tried]:
-        """Fitted ones first: a screened gain is an estimate, and does not rank above a fit."""
-        fitted = sorted((t for t in self.found.values() if t.fit), key=lambda t: -t.gain)
-        rest = sorted((t for t in self.found.values() if not t.fit), key=lambda t: -t.gain)
-        least = max(fitted[-1].gain, 0.0) if fitted else np.inf
-        return fitted + [t._replace(gain=min(t.gain, least)) for t in rest]
-
-
-def shortlist(screened: Sequence[Screened], length: int) -> list[Screened]:
-    """The best of the screened, with the best start each."""
-    best: dict[tuple[str, str], Screened] = {}
-    for one in screened:
-        best.setdefault(one.addition.key, one)
-        if len(best) == length:
-            break
-    return list(best.values())

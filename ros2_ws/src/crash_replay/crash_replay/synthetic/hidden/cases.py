@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ...recording import Recording, RecordingError
 from ..scenario import Truth, record
 from ..truth_file import truth_text, yaml_text
-from .observable import ON_ELEMENTS, SHOWS, distance, targets
+from .observable import nameable, shows, targets
 from .outside import OUTSIDE
 from .specimen import Peaks, Specimen, peaks_of
 from .structures import STRUCTURES
@@ -53,8 +54,7 @@ class HiddenCase:
 def hideable(structure: str) -> list[str]:
     """The effects that can be hidden in a structure; one that acts on an element, in some draws of it."""
     specimen = STRUCTURES[structure](np.random.default_rng(0))
-    peaks = peaks_of(specimen)
-    return [effect for effect in EFFECTS if effect in ON_ELEMENTS or targets(specimen, peaks, effect)]
+    return [effect for effect in EFFECTS if nameable(specimen, effect)]
 
 
 def draw_case(
@@ -65,43 +65,65 @@ def draw_case(
     at: effect -> target, where it is not to be drawn. Raises RecordingError where the effects cannot be hidden, or
     would not show (see `observable`).
     """
-    if structure not in STRUCTURES:
-        raise RecordingError(f"there is no structure {structure!r}: give one of {', '.join(STRUCTURES)}")
-    for effect in effects:
-        if effect not in EFFECTS:
-            raise RecordingError(f"there is no effect {effect!r} to hide: give one of {', '.join(EFFECTS)}")
-    known: set[str] = set()
+    at = at or {}
+    _check(structure, effects, at)
     for draw in range(DRAWS):
         rng = np.random.default_rng([seed, draw])
         specimen = STRUCTURES[structure](rng)
         if not effects:
             return HiddenCase(seed, specimen, ())
-        peaks = peaks_of(specimen)
-        hidden = _hide(specimen, peaks, effects, size, at or {}, rng)
+        hidden = _hide(specimen, peaks_of(specimen), effects, size, at, rng)
         if hidden:
             return HiddenCase(seed, *hidden)
-        known |= {t for effect in effects for t in targets(specimen, peaks, effect)}
-    wanted = ", ".join(f"{e} on {at[e]}" if at and e in at else e for e in effects)
-    raise RecordingError(
-        f"{wanted} cannot be told in structure {structure}: "
-        + (f"it can be on {', '.join(sorted(known))}" if known else "it has no target there")
-    )
+    wanted = ", ".join(f"{e} on {at[e]}" if e in at else e for e in effects)
+    raise RecordingError(f"{wanted} shows in none of {DRAWS} draws of structure {structure} with seed {seed}: try another")
+
+
+def _check(structure: str, effects: Sequence[str], at: Mapping[str, str]) -> None:
+    if structure not in STRUCTURES:
+        raise RecordingError(f"there is no structure {structure!r}: give one of {', '.join(STRUCTURES)}")
+    specimen = STRUCTURES[structure](np.random.default_rng(0))
+    for effect in effects:
+        if effect not in EFFECTS:
+            raise RecordingError(f"there is no effect {effect!r} to hide: give one of {', '.join(EFFECTS)}")
+        could = nameable(specimen, effect)
+        if at.get(effect, could[0] if could else None) not in could:
+            wanted = f"{effect} on {at[effect]}" if effect in at else effect
+            reason = f"it can be on {', '.join(could)}" if could else "it has no target there"
+            raise RecordingError(f"{wanted} cannot be told in structure {structure}: {reason}")
+
+
+class _Drawn(NamedTuple):
+    effect: str
+    target: str
+    share: float
+    stream: int  # seed of what else the effect draws
 
 
 def _hide(
-    specimen: Specimen, peaks: Peaks, effects: Sequence[str], size: float, at: Mapping[str, str], rng: np.random.Generator
+    bare: Specimen, peaks: Peaks, effects: Sequence[str], size: float, at: Mapping[str, str], rng: np.random.Generator
 ) -> tuple[Specimen, tuple[Hidden, ...]] | None:
-    """None where an effect has no target in this specimen, or none where it shows."""
-    bare, done = specimen, []
+    """None where an effect has no target in this specimen, or does not show beside the others."""
+    drawn: list[_Drawn] = []
     for effect in effects:
-        free = [t for t in targets(bare, peaks, effect) if t not in [h.target for h in done]]
+        free = [t for t in targets(bare, peaks, effect) if t not in [d.target for d in drawn]]
         free = [t for t in free if t == at.get(effect, t)]
         if not free:
             return None
-        target, share, stream = str(rng.choice(free)), rng.uniform(*NOMINAL), int(rng.integers(2**32))
-        nominal, _ = EFFECTS[effect](bare, peaks, target, share, np.random.default_rng(stream))
-        if distance(bare, nominal) < SHOWS:
+        drawn.append(_Drawn(effect, str(rng.choice(free)), rng.uniform(*NOMINAL), int(rng.integers(2**32))))
+    nominal, _ = _with(bare, peaks, drawn, 1.0)
+    for one in drawn:
+        others, _ = _with(bare, peaks, [d for d in drawn if d is not one], 1.0)
+        if not shows(others, one.effect, one.target, nominal):
             return None
+    return _with(bare, peaks, drawn, size)
+
+
+def _with(
+    specimen: Specimen, peaks: Peaks, drawn: Sequence[_Drawn], size: float
+) -> tuple[Specimen, tuple[Hidden, ...]]:
+    done = []
+    for effect, target, share, stream in drawn:
         specimen, hidden = EFFECTS[effect](specimen, peaks, target, size * share, np.random.default_rng(stream))
         done.append(hidden)
     return specimen, tuple(done)

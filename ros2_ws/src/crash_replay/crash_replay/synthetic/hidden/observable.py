@@ -11,7 +11,10 @@ Left out, because no method could name them from what is recorded:
 - with a measured crush (`impactor`) a scale of the only equation M a = F(X, V), F free: `added_mass`, `channel_gain`;
   a constant in it: `constant_force` is `channel_offset`; a lag in it: `channel_delay` is a damper less;
 - `load_path` in a structure whose bodies are all joined already;
-- whatever moves the recorded accelerations and forces by less than SHOWS in all.
+- a `clearance` or other law with which the element hardly carries any more: no stiffness at all then does as well;
+- whatever moves the recorded accelerations and forces by less than SHOWS in all, beside the other effects hidden;
+- what is outside the vocabulary in name only: by less than SHOWS_OUTSIDE from the nearest effect inside, such as a mass that
+  has grown before the body is pushed. It is more than SHOWS because several effects together come nearer than one.
 """
 
 import numpy as np
@@ -19,7 +22,8 @@ from scipy.constants import g as G
 
 from ..integrate import History, simulate
 from ..scenario import signals_of
-from .specimen import COARSE_RATE, COARSE_STEP, SPEEDS, Peaks, Specimen
+from .outside import OUTSIDE, nearest_inside
+from .specimen import COARSE_RATE, COARSE_STEP, SPEEDS, Peaks, Specimen, peaks_of
 
 CARRIES, MOVES, UNLOADS = 0.15, 0.010, 0.5
 """Share of the largest peak force; m; share of the peak force that is gone at the end."""
@@ -33,6 +37,8 @@ ON_ELEMENTS = (
     "clearance", "plastic_unloading",
 )  # fmt: skip
 
+SHOWS_OUTSIDE = 3.0 * SHOWS
+
 NOISE = {"acceleration": 1.0 * G, "force": 3000.0}
 
 NOT_TOLD = {
@@ -44,34 +50,49 @@ NOT_TOLD = {
 }  # fmt: skip
 
 
-def targets(specimen: Specimen, peaks: Peaks, effect: str) -> list[str]:
-    """Where the effect can be hidden in the specimen; empty where nowhere."""
-    strongest = max(peaks.force.values())
-    carrying = [e for e in peaks.force if peaks.force[e] >= CARRIES * strongest and peaks.travel[e] >= MOVES]
-    pressed = [e for e in carrying if peaks.crush[e] >= MOVES]
-    free = [b.name for b in specimen.scenario.system.bodies if b.mass]
+def nameable(specimen: Specimen, effect: str) -> list[str]:
+    """What the effect could act on in a structure, whatever is drawn; empty where nothing."""
     channels = {q: [s.channel.name for s in specimen.scenario.sensors if s.channel.quantity == q] for q in NOISE}
     match effect:
-        case "viscous_damping" | "quadratic_damping" | "coulomb_friction":
-            found = carrying
-        case "rate_hardening":
-            found = pressed
-        case "cubic_stiffness" | "bottoming_out" | "clearance":
-            found = [e for e in pressed if specimen.told(e) != "curve"]
-        case "plastic_unloading":
-            found = [e for e in pressed if peaks.drop[e] >= UNLOADS]
+        case _ if effect in ON_ELEMENTS:
+            found = [e.name for e in specimen.scenario.system.elements]
         case "load_path":
             found = ["-".join(pair) for pair in specimen.pairs]
         case "unmodelled_body":
-            axis = specimen.scenario.sensors[0].channel.axis
-            found = [f"extra_a{axis}"]
+            found = [f"extra_a{specimen.scenario.sensors[0].channel.axis}"]
         case "channel_delay" | "channel_gain":
             found = channels["acceleration"] + channels["force"]
         case "channel_offset":
             found = channels["acceleration"]
         case _:
-            found = free
+            found = [b.name for b in specimen.scenario.system.bodies if b.mass]
     return [target for target in found if (effect, target) not in NOT_TOLD.get(specimen.name, ())]
+
+
+def targets(specimen: Specimen, peaks: Peaks, effect: str) -> list[str]:
+    """Where the effect can be hidden in the specimen; empty where nowhere."""
+    if effect not in ON_ELEMENTS:
+        return nameable(specimen, effect)
+    strongest = max(peaks.force.values())
+    carrying = [e for e in peaks.force if peaks.force[e] >= CARRIES * strongest and peaks.travel[e] >= MOVES]
+    pressed = [e for e in carrying if peaks.crush[e] >= MOVES]
+    match effect:
+        case "viscous_damping" | "quadratic_damping" | "coulomb_friction":
+            return carrying
+        case "rate_hardening":
+            return pressed
+        case "plastic_unloading":
+            return [e for e in pressed if peaks.drop[e] >= UNLOADS]
+    return [e for e in pressed if specimen.told(e) != "curve"]
+
+
+def shows(bare: Specimen, effect: str, target: str, with_it: Specimen) -> bool:
+    """Whether an effect of nominal size, hidden in `bare`, can be told from what is recorded."""
+    if effect in ON_ELEMENTS and target not in targets(with_it, peaks_of(with_it), effect):
+        return False
+    if effect in OUTSIDE and distance(nearest_inside(with_it, effect, target), with_it) < SHOWS_OUTSIDE:
+        return False
+    return distance(bare, with_it) >= SHOWS
 
 
 def distance(specimen: Specimen, other: Specimen) -> float:

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
-from .specimen import Specimen
+from ..integrate import simulate
+from .specimen import COARSE_RATE, COARSE_STEP, Specimen
 from .vocabulary import Hidden, Hide
 
 
@@ -47,16 +48,38 @@ def timed_force(specimen, peaks, target, share, rng):
 
 
 def changing_mass(specimen, peaks, target, share, rng):
-    """A mass that grows by the share within 30 ms, such as cargo that comes to bear."""
-    start = rng.uniform(0.02, 0.04)
+    """A mass that grows by the share within 30 ms, such as cargo that comes to bear; sooner in the shorter impact."""
+    start, length = rng.uniform(0.02, 0.04), 0.03
     if specimen.name == "impactor":
-        start *= 0.5
+        start, length = 0.4 * start, 0.2 * length
 
     def growth(time: np.ndarray) -> np.ndarray:
-        return 1.0 + share * np.clip((time - start) / 0.03, 0.0, 1.0)
+        return 1.0 + share * np.clip((time - start) / length, 0.0, 1.0)
 
     hidden = Hidden("changing_mass", target, share * specimen.body(target).mass, "kg")
     return specimen.with_body(target, growth=growth), hidden
+
+
+def nearest_inside(specimen: Specimen, effect: str, target: str) -> Specimen:
+    """The specimen with the effect of the vocabulary that comes nearest instead: the mean of what changes.
+
+    A constant mass, weighted with the body's acceleration squared; a constant force; a channel's gain.
+    """
+    time = np.arange(0.0, specimen.scenario.duration, 1.0 / COARSE_RATE)
+    body = specimen.body(target)
+    names = [b.name for b in specimen.scenario.system.bodies]
+    motion = simulate(specimen.scenario.system, time, COARSE_STEP).acceleration[:, names.index(target)]
+    match effect:
+        case "changing_mass":
+            constant = float(np.average(body.growth(time), weights=motion**2))
+            return specimen.with_body(target, mass=constant * body.mass, growth=None)
+        case "timed_force":
+            constant = float(np.mean(body.push(time)))
+            return specimen.with_body(target, push=lambda time: np.full(len(time), constant))
+    channel = _channel_of(specimen, target)
+    seen = next(s for s in specimen.scenario.sensors if s.channel.name == channel).distortion(time, motion)
+    constant = float(motion @ seen / (motion @ motion))
+    return specimen.with_sensor(channel, distortion=lambda time, signal: constant * signal)
 
 
 OUTSIDE: Mapping[str, Hide] = {hide.__name__: hide for hide in (rotation, timed_force, changing_mass)}

@@ -1,0 +1,48 @@
+"""A structure with some additions, fitted to recordings."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..structure import Structure
+from .assess import Left, assess
+from .curves import adapted_roughness
+from .fit import MOST_ITERATIONS, SLOWLY, Fit, fit
+from .layout import Addition, Layout, make_layout
+from .records import Record
+from .scales import Scales
+
+
+class Model(NamedTuple):
+    """The structure with some additions, fitted."""
+
+    additions: tuple[Addition, ...]
+    fit: Fit
+    left: Left
+    roughness: Mapping[str, np.ndarray]
+    records: Sequence[Record]  # with the noise that it was fitted with
+
+
+def fit_model(
+    structure: Structure, records: Sequence[Record], scales: Scales, additions: Sequence[Addition], start: Fit | None = None
+) -> Model:  # fmt: skip
+    """Fit, then let the curves fold where they were found to bend sharply, and fit again."""
+    layout = make_layout(structure, records, scales, additions)
+    found = fit(layout, records, (start.theta, start.trajectories) if start else None)
+    roughness = {link.name: adapted_roughness(link.curve, found.theta) for link in layout.links if link.curve is not None}
+    if roughness and np.isfinite(found.cost):
+        layout = make_layout(structure, records, scales, additions, roughness)
+        found = fit(layout, records, (found.theta, found.trajectories))
+    left = assess(found, records)
+    if forces_jump(layout) and not left.whiteness.white and records[0].mix is None:
+        slower = fit(layout, records, (found.theta, found.trajectories), refine=SLOWLY, most=2 * MOST_ITERATIONS)
+        if slower.evidence > found.evidence:
+            found, left = slower, assess(slower, records)
+    return Model(tuple(additions), found, left, roughness, records)
+
+
+def forces_jump(layout: Layout) -> bool:
+    """Whether some force ends at separation other than by falling to zero."""
+    one_way = [link for link in layout.links if not link.tension]
+    return any(link.forces or link.damping is not None or link.known_damping for link in one_way)

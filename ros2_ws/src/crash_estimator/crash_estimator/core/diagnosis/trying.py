@@ -1,0 +1,173 @@
+"""One round of the search: all candidates screened, the likely ones fitted, harder where none leaves only noise."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..effects.base import AttachedBody, ChannelError, Effect
+from .assess import assess
+from .candidates import candidates, touching
+from .fit import MOST_ITERATIONS, REFINE, SLOWLY, Fit, fit
+from .layout import Addition, Layout, make_layout
+from .model import Model
+from .motion import motion_of
+from .records import Record
+from .scales import Scales
+from .screening import Screened, changes_law, embedding, screen
+from .trajectory import Trajectory
+
+GAIN = 6.0
+"""Nats from which a candidate counts as found; below it, the smaller model is preferred."""
+
+SHORTLIST = 4
+"""Candidates from each of the two screenings that are fitted in full ..."""
+
+LONG_LIST = 10
+"""... and where none of them leaves white noise."""
+
+MOST_HOSTS = 3
+"""Bodies that an unmodelled one is tried on, with a curve to each neighbour."""
+
+SLOW = 3
+"""Candidates that are then fitted on with more care."""
+
+WORTH_FITTING = 1.0
+"""Nats of a screened gain."""
+
+HOPELESS = 400.0
+"""A candidate whose cost stays this far above the best one's is not fitted to the end."""
+
+OFFSET_START = 25.0
+"""m/s^2: an offset bends the measured motion itself, from which fits start."""
+
+
+class Tried(NamedTuple):
+    """A candidate, and the model with it."""
+
+    addition: Addition
+    gain: float  # nats
+    fit: Fit | None  # None: only screened
+    screened: Screened | None
+
+
+def try_candidates(
+    records: Sequence[Record], scales: Scales, effects: Mapping[str, Effect], model: Model, thorough: bool = False
+) -> list[Tried]:
+    """All candidates for one more addition, best first; one for each effect and target.
+
+    thorough: try more of them, and harder, where none of the most likely ones leaves white noise.
+    """
+    additions = candidates(scales.structure, scales, effects, model.additions)
+    by_fit = screen(records, scales, model.additions, additions, model.roughness, model.fit)
+    by_motion = [] if model.left.whiteness.white else screen(records, scales, model.additions, additions, model.roughness)
+    worth = [one for one in by_fit if one.gain > WORTH_FITTING]
+    search = _Search(records, scales, model, by_fit)
+    search.from_motion(shortlist(by_motion, SHORTLIST))
+    search.from_model(shortlist(worth, SHORTLIST))
+    if thorough and not model.left.whiteness.white:
+        offsets = [a for a in additions if isinstance(a.effect, ChannelError) and a.effect.role == "offset"]
+        shifted = [replace(a, coefficient=sign * OFFSET_START) for a in offsets for sign in (-1.0, 1.0)]
+        for harder in (
+            search.slowly,
+            lambda: search.from_model(shortlist(by_motion, SHORTLIST) + shortlist(worth, LONG_LIST)),
+            lambda: search.from_motion(shortlist(worth, SHORTLIST) + shortlist(by_motion, LONG_LIST)),
+            lambda: search.from_motion([Screened(a, 0.0, a.coefficient, 1.0) for a in shifted]),
+            search.slowly,
+        ):
+            if search.reached_the_floor():
+                break
+            harder()
+    return search.ranking()
+
+
+class _Search:
+    """Candidates of one round, the best start of each effect and target."""
+
+    def __init__(self, records: Sequence[Record], scales: Scales, model: Model, screened: Sequence[Screened]):
+        self.records, self.scales, self.model = records, scales, model
+        self.screened = screened
+        self.least = model.fit.cost
+        self.done: set[tuple[int, bool]] = set()
+        self.found: dict[tuple[str, str], Tried] = {}
+        for one in screened:
+            self.found.setdefault(one.addition.key, Tried(one.addition, one.gain, None, one))
+
+    def from_motion(self, chosen: Iterable[Screened]) -> None:
+        """Fit candidates from the measured motion."""
+        for one in chosen:
+            self._fit(one.addition, None)
+            if isinstance(one.addition.effect, AttachedBody):
+                self._touching(one.addition)
+
+    def from_model(self, chosen: Iterable[Screened]) -> None:
+        """Fit candidates from the fit of the model without them."""
+        for one in chosen:
+            self._fit(one.addition, one)
+
+    def _touching(self, addition: Addition) -> None:
+        """What an unmodelled body pushes: the body that takes the rest of its balance may be any of those it may touch."""
+        hosts: dict[str, Addition] = {addition.host: addition}
+        for one in self.screened:
+            if one.addition.key == addition.key:
+                hosts.setdefault(one.addition.host, one.addition)
+        for host in list(hosts.values())[:MOST_HOSTS]:
+            for variant in touching(self.scales.structure, host):
+                self._fit(variant, None)
+
+    def slowly(self) -> None:
+        """Fit the best ones on, with care for forces that jump."""
+        for tried in [t for t in self.ranking() if t.fit][:SLOW]:
+            start = tried.fit.theta, tried.fit.trajectories
+            self._note(tried.addition, fit(tried.fit.layout, self.records, start, refine=SLOWLY, most=2 * MOST_ITERATIONS))
+
+    def _fit(self, addition: Addition, screened: Screened | None) -> None:
+        if (id(addition), screened is None) in self.done:
+            return
+        self.done.add((id(addition), screened is None))
+        model, scales = self.model, self.scales
+        layout = make_layout(scales.structure, self.records, scales, [*model.additions, addition], model.roughness)
+        start = self._start(layout, addition, screened) if screened else None
+        self._note(addition, fit(layout, self.records, start, self.least + HOPELESS, refine=REFINE))
+
+    def _note(self, addition: Addition, found: Fit) -> None:
+        self.least = min(self.least, found.cost)
+        gain = found.evidence - self.model.fit.evidence
+        before = self.found.get(addition.key)
+        if before is None or before.fit is None or gain > before.gain:
+            self.found[addition.key] = Tried(addition, gain, found, None)
+
+    def _start(self, layout: Layout, addition: Addition, screened: Screened) -> tuple[np.ndarray, list[Trajectory]]:
+        theta = layout.start.copy()
+        theta[embedding(self.model.fit.layout, layout)] = self.model.fit.theta
+        if not changes_law(addition):
+            place = next(place for place in layout.places if place.addition is addition)
+            theta[place.coefficient] = screened.coefficient
+        motions = [
+            motion_of(layout, record, r, theta, trajectory.a)
+            for r, (record, trajectory) in enumerate(zip(self.records, self.model.fit.trajectories))
+        ]
+        return theta, motions
+
+    def reached_the_floor(self) -> bool:
+        """The best so far leaves nothing but noise."""
+        best = self.ranking()[0]
+        return best.fit is not None and best.gain > GAIN and assess(best.fit, self.records).whiteness.white
+
+    def ranking(self) -> list[Tried]:
+        """Fitted ones first: a screened gain is an estimate, and does not rank above a fit."""
+        fitted = sorted((t for t in self.found.values() if t.fit), key=lambda t: -t.gain)
+        rest = sorted((t for t in self.found.values() if not t.fit), key=lambda t: -t.gain)
+        least = max(fitted[-1].gain, 0.0) if fitted else np.inf
+        return fitted + [t._replace(gain=min(t.gain, least)) for t in rest]
+
+
+def shortlist(screened: Sequence[Screened], length: int) -> list[Screened]:
+    """The best of the screened, with the best start each."""
+    best: dict[tuple[str, str], Screened] = {}
+    for one in screened:
+        best.setdefault(one.addition.key, one)
+        if len(best) == length:
+            break
+    return list(best.values())

@@ -1,0 +1,146 @@
+"""The vocabulary of effects: each one's physics, what it may act on, and a user's own."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.testing import assert_allclose, assert_array_equal
+
+from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.effects.base import ElementForce, ElementMotion
+from crash_estimator.core.effects.targets import checked, key_of, possible_targets
+from crash_estimator.core.effects.user import load_effects
+from crash_estimator.core.structure import EffectSpec, ModelError
+from crash_estimator.model_file import load_model
+
+VOCABULARY = """viscous_damping quadratic_damping coulomb_friction rate_hardening cubic_stiffness clearance
+bottoming_out plastic_unloading load_path added_mass unmodelled_body constant_force channel_delay channel_gain
+channel_offset""".split()
+DAMPERS = ("viscous_damping", "quadratic_damping", "coulomb_friction")
+FORCES = [effect for effect in EFFECTS.values() if isinstance(effect, ElementForce)]
+SMALL = st.floats(-10.0, 10.0, allow_subnormal=False)
+
+
+def motion(crush, rate) -> ElementMotion:
+    crush = np.asarray(crush, float)
+    time = 1e-4 * np.arange(len(crush))
+    return ElementMotion(time, crush, np.asarray(rate, float), np.maximum.accumulate(crush), np.zeros_like(crush))
+
+
+def middle(effect) -> dict[str, float]:
+    return {name: shape.starts[0] for name, shape in effect.shapes.items()}
+
+
+def test_the_vocabulary_is_that_of_the_design():
+    assert list(EFFECTS) == VOCABULARY
+    assert all(name == effect.name for name, effect in EFFECTS.items())
+
+
+@pytest.mark.parametrize("name", DAMPERS)
+@settings(max_examples=50, deadline=None)
+@given(rate=arrays(float, 20, elements=SMALL))
+def test_a_damper_never_adds_energy(name, rate):
+    effect = EFFECTS[name]
+    assert effect.low == 0.0
+    assert np.all(effect.force(motion(np.zeros(20), rate), **middle(effect)) * rate >= 0.0)
+
+
+@pytest.mark.parametrize("effect", FORCES, ids=lambda effect: effect.name)
+def test_one_instant_is_the_same_row_of_the_whole_record(effect):
+    rng = np.random.default_rng(3)
+    whole = motion(rng.normal(0.1, 0.1, 30), rng.normal(0.0, 5.0, 30))
+    rows = [effect.force(ElementMotion(*(x[k : k + 1] for x in whole)), **middle(effect)) for k in range(30)]
+    assert_array_equal(np.concatenate(rows), effect.force(whole, **middle(effect)))
+
+
+def test_forces_have_the_sizes_of_their_equations():
+    here = motion([0.2, 0.2], [3.0, -3.0])
+    assert_allclose(EFFECTS["viscous_damping"].force(here), [3.0, -3.0])
+    assert_allclose(EFFECTS["quadratic_damping"].force(here), [9.0, -9.0])
+    assert_allclose(EFFECTS["coulomb_friction"].force(here, speed=0.1), [1.0, -1.0])
+    assert_allclose(EFFECTS["cubic_stiffness"].force(here), [8e-3, 8e-3])
+    assert_allclose(EFFECTS["bottoming_out"].force(motion([0.1, 0.2], [1.0, 1.0]), stop=0.15), [0.0, 0.05], atol=1e-15)
+
+
+def test_the_rate_of_cowper_and_symonds_doubles_the_force():
+    hardening = EFFECTS["rate_hardening"]
+    c = hardening.unstated(40.0, exponent=5.0)
+    assert 1.0 + c * hardening.factor(np.array([40.0]), exponent=5.0)[0] == pytest.approx(2.0)
+    assert hardening.stated(c, exponent=5.0) == pytest.approx(40.0)
+    assert_allclose(hardening.factor(np.array([-5.0, 0.0]), exponent=5.0), 0.0)
+
+
+def test_the_limits_are_physical():
+    """Damping and stiffness never negative; a delay within 1 ms, a gain within 10 %, an offset within 5 g."""
+    signed = {"constant_force", "channel_gain", "channel_offset"}
+    assert {name for name, effect in EFFECTS.items() if effect.low < 0.0} == signed
+    assert EFFECTS["channel_delay"].high == pytest.approx(1e-3)
+    assert (EFFECTS["channel_gain"].low, EFFECTS["channel_gain"].high) == pytest.approx((-0.1, 0.1))
+    assert EFFECTS["channel_offset"].high == pytest.approx(5.0 * 9.80665)
+
+
+def test_targets_are_elements_bodies_channels_and_pairs():
+    structure = load_model("side_dummy")
+    kinds = {name: key_of(effect) for name, effect in EFFECTS.items()}
+    assert (kinds["clearance"], kinds["added_mass"], kinds["channel_gain"]) == ("element", "body", "channel")
+    assert "rib_spine" in possible_targets(structure, EFFECTS["clearance"])
+    assert "door_upper" not in possible_targets(structure, EFFECTS["added_mass"])
+    assert "rib-pelvis" in possible_targets(structure, EFFECTS["load_path"])
+
+
+def friction(**shape: float) -> EffectSpec:
+    return EffectSpec("coulomb_friction", "door_rib", shape=shape)
+
+
+MISTAKES = {
+    "no such effect": (EffectSpec("coulomb", "door_rib"), "no effect 'coulomb'; did you mean 'coulomb_friction'"),
+    "no such element": (EffectSpec("clearance", "door_rip"), "cannot act on 'door_rip'; .*did you mean 'door_rib'"),
+    "a driven body": (EffectSpec("added_mass", "car"), "cannot act on 'car'; it needs a free body"),
+    "another shape": (friction(sped=1.0), "no shape constant 'sped'; it has speed"),
+    "a shape below 0": (friction(speed=-1.0), "speed must be above 0, got -1"),
+    "a negative damper": (EffectSpec("viscous_damping", "door_rib", -5.0), "must be not below 0 N.s/m, got -5"),
+    "a late channel": (EffectSpec("channel_delay", "rib_ay", 0.002), "must be from 0 to 0.001 s, got 0.002"),
+    "no such host": (EffectSpec("unmodelled_body", "nose_ay", host="ribs"), "must be a body, got 'ribs'; .* 'rib'"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_a_model_s_effect_is_one_clear_line(mistake):
+    spec, expected = MISTAKES[mistake]
+    with pytest.raises(ModelError, match=expected) as found:
+        checked(load_model("side_dummy"), spec, EFFECTS)
+    assert "\n" not in str(found.value) and "side_dummy" in str(found.value)
+
+
+OWN = '''
+"""Fluid drag: F = c V^3."""
+from crash_estimator.core.effects.base import ElementForce
+
+EFFECT = ElementForce("cubic_damping", "N*s^3/m^3", force=lambda motion: motion.rate**3)
+'''
+
+
+def test_a_user_s_effect_is_a_file(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(OWN)
+    found = load_effects(path)
+    assert list(found) == ["cubic_damping"]
+    assert_allclose(found["cubic_damping"].force(motion([0.0], [2.0])), [8.0])
+
+
+BAD_FILES = {
+    "nothing": ("x = 1", "defines no effect"),
+    "a taken name": (OWN.replace("cubic_damping", "viscous_damping"), "'viscous_damping' is an effect of"),
+    "an error": ("1 / 0", "ZeroDivisionError"),
+    "not Python": ("def (", "SyntaxError"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD_FILES)
+def test_a_user_s_file_with_a_fault_is_one_clear_line(kind, tmp_path):
+    text, expected = BAD_FILES[kind]
+    path = tmp_path / "mine.py"
+    path.write_text(text)
+    with pytest.raises(ModelError, match=f"mine.py.*{expected}"):
+        load_effects(path)
