@@ -27,6 +27,9 @@ class Outlet:
     def has_room(self, now, on_time):
         return self.room
 
+    def wait_for_room(self):
+        pass
+
     def look(self):
         pass
 

@@ -46,6 +46,11 @@ class Lockstep:
         for name in sorted(gone):
             self.warn(f"{name} has gone, the replay no longer waits for it")
 
+    def told(self) -> dict[str, Answered]:
+        """What each listener that is there has told last."""
+        with self.changed:
+            return {name: self.answers[name] for name in sorted(self.known & self.answers.keys())}
+
     def expect(self, run: int, number: int) -> None:
         """Samples up to `number` are about to be sent."""
         with self.changed:

@@ -31,6 +31,7 @@ class Outlet(Protocol):
     def send(self, batch: Batch) -> None: ...
     def send_state(self, player: Player, tally: Tally, block: int) -> None: ...
     def has_room(self, now: float, on_time: bool) -> bool: ...  # for more, at the wall time now
+    def wait_for_room(self) -> None: ...  # a moment
     def look(self) -> None: ...  # called where there is time to see what has arrived
     def test_has_arrived(self) -> bool: ...
     def all_have_arrived(self) -> bool: ...
@@ -83,8 +84,12 @@ class Pacing:
         while self._waits() and not self.outlet.test_has_arrived() and time.perf_counter() < limit:
             time.sleep(0.001)
 
-    def start(self, paused: bool = False) -> None:
-        """Play from the first sample, or wait for commands; where one has come already, it stands."""
+    def start(self, paused: bool = False, delay: float = 0.0) -> None:
+        """After `delay` s play from the first sample, or wait for commands; where one has come already, it stands."""
+        limit = time.perf_counter() + delay
+        while self._waits() and time.perf_counter() < limit:
+            self._send_state_if_due()
+            time.sleep(min(0.005, delay))
         if self._waits():
             self.command(Player.pause if paused else Player.resume)
 
@@ -101,7 +106,7 @@ class Pacing:
             elif self.outlet.has_room(now, on_time=-ON_TIME < spare):
                 self._send_due(block)
             else:
-                time.sleep(0.0005)
+                self.outlet.wait_for_room()
 
     def finish(self) -> str:
         """Let subscribers take what has been sent; one line on how it all went."""

@@ -32,3 +32,11 @@ SAID = QoSProfile(
     depth=200,
 )
 """A diagnosis: few messages, which a late joiner gets as well."""
+
+UNLATCHED = QoSProfile(
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+)
+"""What a latched topic is subscribed to with where its publisher may not latch: rosbag2's, of a bag without QoS."""

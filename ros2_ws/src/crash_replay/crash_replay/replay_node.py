@@ -5,6 +5,7 @@ import signal
 import sys
 from collections.abc import Callable
 from threading import Thread
+from typing import Any
 
 import rclpy
 from crash_msgs.srv import Burst, Seek, SetRate, Step
@@ -17,12 +18,15 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from .bag import read_bag
+from .console import Console, wanted
 from .pacing import Pacing, SubscribersMissing
 from .player import SECOND, CommandError, Player
 from .recording import RecordingError
-from .replay_parameters import ParameterError, checked, declare_parameters
+from .replay_parameters import LIVE, ParameterError, checked, declare_parameters, names_in, window_of
 from .replay_topics import ReplayTopics
 from .ros_runtime import acknowledge_promptly, spin
+from .samples_again import serve_samples
+from .selection import SelectionError, samples_within, select_channels
 
 
 class ReplayNode(Node):
@@ -31,9 +35,11 @@ class ReplayNode(Node):
     def __init__(self) -> None:
         super().__init__("replay", automatically_declare_parameters_from_overrides=True)
         self.asked = declare_parameters(self)
-        recording = read_bag(self.asked["bag"])
-        player = Player(recording.time_ns, self.asked["rate"], self.asked["loop"])
-        topics = ReplayTopics(self, recording, self.asked["clock"])
+        asked = self.asked
+        recording = select_channels(read_bag(asked["bag"]), names_in(asked["channels"]), names_in(asked["exclude"]))
+        window = samples_within(window_of(asked), recording.time_ns)
+        player = Player(recording.time_ns, asked["rate"], asked["loop"], *window)
+        topics = ReplayTopics(self, recording, asked["clock"], asked["answer_timeout"] if asked["lockstep"] else None)
         self.pacing = Pacing(recording, player, topics, self.asked["block"])
         for command in (Player.pause, Player.resume, Player.toggle):
             self.create_service(Trigger, f"~/{command.__name__}", self._on_trigger(command))
@@ -41,14 +47,22 @@ class ReplayNode(Node):
         self.create_service(Seek, "~/seek", self._on_seek)
         self.create_service(SetRate, "~/set_rate", self._on_set_rate)
         self.create_service(Burst, "~/burst", self._on_burst)
+        serve_samples(self, recording)
         self.add_on_set_parameters_callback(self._on_parameters)
 
     def replay(self) -> str:
         """All of it, in the calling thread; one line on how it went."""
-        self.pacing.wait_for_subscribers(self.asked["wait_for"], self.asked["wait_timeout"])
-        self.pacing.start(self.asked["start_paused"])
-        self.pacing.play(self.asked["keep_alive"])
-        return self.pacing.finish()
+        keyboard, progress = (wanted(self.asked[k], s) for k, s in (("keyboard", sys.stdin), ("progress", sys.stderr)))
+        with Console(self.pacing, self._set, keyboard, progress):
+            self.pacing.wait_for_subscribers(self.asked["wait_for"], self.asked["wait_timeout"])
+            self.pacing.start(self.asked["start_paused"], self.asked["delay"])
+            self.pacing.play(self.asked["keep_alive"])
+            return self.pacing.finish()
+
+    def _set(self, values: dict[str, Any]) -> str:
+        """Set parameters together; why not, or nothing."""
+        result = self.set_parameters_atomically([Parameter(name, value=value) for name, value in values.items()])
+        return "" if result.successful else result.reason
 
     def _on_trigger(self, command: Callable) -> Callable:
         def serve(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -95,12 +109,20 @@ class ReplayNode(Node):
         return response
 
     def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
-        for parameter in parameters:
-            if parameter.name == "rate":
-                try:
-                    self.pacing.command(Player.set_rate, checked("rate", parameter.value))
-                except ParameterError as error:
-                    return SetParametersResult(successful=False, reason=str(error))
+        """Follow a change of what may be changed at any time; nothing of it where one part cannot be."""
+        try:
+            new = {p.name: checked(p.name, p.value) for p in parameters if p.name in LIVE}
+            asked = self.asked | new
+            window = samples_within(window_of(asked), self.pacing.player.time_ns)
+        except (ParameterError, SelectionError) as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        self.asked = asked
+        if "rate" in new:
+            self.pacing.command(Player.set_rate, new["rate"])
+        if "loop" in new:
+            self.pacing.command(Player.set_loop, new["loop"])
+        if new.keys() & {"from", "until"}:
+            self.pacing.command(Player.set_window, *window)
         return SetParametersResult(successful=True)
 
 
@@ -110,7 +132,7 @@ def main() -> int:
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = ReplayNode()
-    except (ParameterError, RecordingError, CommandError) as error:
+    except (ParameterError, RecordingError, SelectionError, CommandError) as error:
         print(f"error: {error}", file=sys.stderr)
         rclpy.shutdown()
         return 1

@@ -1,29 +1,43 @@
 """What `replay` publishes."""
 
-from crash_msgs.msg import ReplayState, Samples, TestInfo
+import time
+
+from crash_msgs.msg import Answer, ReplayState, Samples, TestInfo
 from rclpy.node import Node
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from rosgraph_msgs.msg import Clock
 
 from .flow import NOT_WAITING, Flow
+from .lockstep import Answered, Lockstep
 from .player import SECOND, Batch, Player, Tally
-from .qos import LATCHED, STREAM
+from .qos import LATCHED, SAID, STREAM
 from .recording import Recording
 from .ros_messages import channel_to_msg, channel_type, samples_to_msg, stamp, test_to_msg, time_zero_ns
 
 
+OVERRIDABLE = QoSOverridingOptions.with_default_policies()
+
+
 class ReplayTopics:
-    def __init__(self, node: Node, recording: Recording, with_clock: bool):
+    def __init__(self, node: Node, recording: Recording, with_clock: bool, answer_timeout: float | None = None):
+        """answer_timeout: s after which lock-step goes on without a silent listener; None: no lock-step."""
         self.node, self.recording = node, recording
         self.time_zero = time_zero_ns(recording)
         self.test = node.create_publisher(TestInfo, "test", LATCHED)
-        self.samples = node.create_publisher(Samples, "samples", STREAM)
+        self.samples = node.create_publisher(Samples, "samples", STREAM, qos_overriding_options=OVERRIDABLE)
         self.state = node.create_publisher(ReplayState, "replay_state", LATCHED)
         self.clock = node.create_publisher(Clock, "/clock", STREAM) if with_clock else None
         self.channels = [
-            node.create_publisher(channel_type(c), f"channels/{c.name}", STREAM) for c in recording.test.channels
+            node.create_publisher(channel_type(c), f"channels/{c.name}", STREAM, qos_overriding_options=OVERRIDABLE)
+            for c in recording.test.channels
         ]
         self.flow = Flow(self._flowing, node.get_logger().warning)
-        self.has_room, self.look = self.flow.has_room, self.flow.look
+        self.look = self.flow.look
+        self.acknowledged = 0  # samples
+        self.lockstep = None
+        if answer_timeout is not None:
+            self.lockstep = Lockstep(self._listeners, node.get_logger().warning, answer_timeout)
+            self.answers = node.create_subscription(Answer, "answers", self._on_answer, SAID)
         self.last_time_ns = int(recording.time_ns[0])  # of the last sample sent
         self.find_subscribers()
         self.test.publish(test_to_msg(recording))
@@ -32,8 +46,30 @@ class ReplayTopics:
         return self.test.wait_for_all_acked(NOT_WAITING)
 
     def all_have_arrived(self) -> bool:
-        """Whether reliable subscribers have got all samples and the last state."""
-        return self.flow.acknowledged() and self.state.wait_for_all_acked(NOT_WAITING)
+        """Whether reliable subscribers have got all samples and the last state, and in lock-step have answered."""
+        answered = self.lockstep is None or self.lockstep.has_room(time.perf_counter())
+        return answered and self.flow.acknowledged() and self.state.wait_for_all_acked(NOT_WAITING)
+
+    def has_room(self, now: float, on_time: bool) -> bool:
+        """Whether more may be sent at the wall time `now`."""
+        if self.lockstep and not self.lockstep.has_room(now):
+            return False
+        return self.flow.has_room(now, on_time)
+
+    def wait_for_room(self) -> None:
+        """A moment, at most 0.5 ms; in lock-step less where the last answer comes."""
+        if self.lockstep and self.lockstep.owing:
+            self.lockstep.wait(0.0005)
+        else:
+            time.sleep(0.0005)
+
+    def _listeners(self) -> set[str]:
+        """Full names of the nodes that publish answers."""
+        found = self.node.get_publishers_info_by_topic(self.answers.topic_name)
+        return {f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in found}
+
+    def _on_answer(self, message: Answer) -> None:
+        self.lockstep.answer(message.node, Answered(message.run, message.number, message.missed))
 
     def subscribers(self) -> int:
         return self.samples.get_subscription_count()
@@ -46,12 +82,16 @@ class ReplayTopics:
         """Look who listens: what nobody listens to is not made."""
         self.clock_heard = self.clock is not None and self.clock.get_subscription_count() > 0
         self.heard = [k for k, publisher in enumerate(self.channels) if publisher.get_subscription_count()]
+        if self.lockstep:
+            self.lockstep.find_listeners()
 
     def _flowing(self) -> list:
         return [self.samples, *(self.channels[k] for k in self.heard), *([self.clock] if self.clock_heard else [])]
 
     def send(self, batch: Batch) -> None:
         """The samples of a batch, the clock at the last of them, and each heard channel's values."""
+        if self.lockstep:
+            self.lockstep.expect(batch.run, batch.stop - 1)
         message = samples_to_msg(self.recording, batch.start, batch.stop, batch.run, self.time_zero)
         self.samples.publish(message)
         self.last_time_ns = self.recording.time_ns.item(batch.stop - 1)
@@ -72,18 +112,26 @@ class ReplayTopics:
 
     def send_state(self, player: Player, tally: Tally, block: int) -> None:
         self.find_subscribers()
+        if self.flow.acknowledged():
+            self.acknowledged = tally.samples
+        answers = self.lockstep.told() if self.lockstep else {}
         message = ReplayState(
             state=int(player.mode),
             run=player.run,
             number=player.next,
             total=len(self.recording),
             sent=tally.samples,
+            acknowledged=self.acknowledged,
             subscribers=self.subscribers(),
             time=self.last_time_ns / SECOND,
             rate_asked=player.rate,
             rate_actual=tally.rate,
             worst_lateness=tally.worst_lateness,
             block=block,
+            listener=list(answers),
+            answered_run=[told.run for told in answers.values()],
+            answered=[told.number for told in answers.values()],
+            missed=[told.missed for told in answers.values()],
         )
         message.header.stamp = stamp(self.time_zero + self.last_time_ns)
         self.state.publish(message)
