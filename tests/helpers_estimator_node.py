@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import rclpy
-from crash_msgs.msg import Event, Forces, Parameters, Residuals, Samples, TestInfo
+from crash_msgs.msg import EstimatorState, Event, Forces, Parameters, Residuals, Samples, TestInfo
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -38,12 +38,12 @@ class Stage:
         self.samples = self.node.create_publisher(Samples, "samples", STREAM)
         self.estimators: list[EstimatorNode] = []
         self.heard: dict[str, dict[str, list]] = {}
-        self.replays: list[subprocess.Popen] = []
+        self.processes: list[subprocess.Popen] = []
 
     def close(self) -> None:
-        for replay in self.replays:
-            replay.terminate()
-            replay.wait(10)
+        for process in self.processes:
+            process.terminate()
+            process.wait(60)
         for node in (*self.estimators, self.node):
             node.destroy_node()
         rclpy.shutdown()
@@ -53,13 +53,11 @@ class Stage:
         node = EstimatorNode(parameter_overrides=overrides, cli_args=["--ros-args", "-r", f"__node:={name}"])
         self.estimators.append(node)
         self.executor.add_node(node)
-        self.heard[name] = {topic: [] for topic in TOPICS}
-        for topic, kind in TOPICS.items():
-            self.node.create_subscription(kind, f"{name}/{topic}", self.heard[name][topic].append, STREAM)
+        self.listen(name)
         self.spin_until(
-            lambda: self.samples.get_subscription_count() == len(self.estimators), "the estimator subscribes"
+            lambda: self.samples.get_subscription_count() >= len(self.estimators), "the estimator subscribes"
         )
-        out = (node.parameters_out, node.residuals_out, node.forces_out, node.events_out)
+        out = [getattr(node.topics, topic) for topic in TOPICS]
         self.spin_until(lambda: all(p.get_subscription_count() for p in out), "somebody listens to the estimator")
         return node
 
@@ -85,21 +83,36 @@ class Stage:
             self.samples.publish(samples_to_msg(recording, first, min(first + block, stop), run, TIME_ZERO))
             self.executor.spin_once(timeout_sec=0.0)
 
-    def replay(self, bag: Path, wait_for: int, rate: float = 0.5) -> None:
+    def replay(self, bag: Path, **parameters) -> subprocess.Popen:
         """Start the real replay, one sample a message."""
-        command = [
-            sys.executable,
-            "-m",
-            "crash_replay.replay_node",
-            "--ros-args",
-            "-p",
-            f"bag:={bag}",
-            "-p",
-            f"rate:={rate}",
-        ]
-        command += ["-p", f"wait_for:={wait_for}", "-p", "block:=1"]
+        return self.start("crash_replay.replay_node", bag=bag, **{"block": 1} | parameters)
+
+    def start(self, module: str, name: str = "", **parameters) -> subprocess.Popen:
+        """A node in a process of its own, ended with the stage."""
+        command = [sys.executable, "-m", module, "--ros-args", *(["-r", f"__node:={name}"] if name else [])]
+        for key, value in parameters.items():
+            command += ["-p", f"{key}:={str(value).lower() if isinstance(value, bool) else value}"]
         environment = os.environ | {"ROS_DOMAIN_ID": str(self.domain)}
-        self.replays.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, env=environment))
+        self.processes.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, env=environment))
+        return self.processes[-1]
+
+    def listen(self, name: str) -> dict[str, list]:
+        """To an estimator, under its name."""
+        self.heard[name] = {topic: [] for topic in TOPICS}
+        for topic, kind in TOPICS.items():
+            self.node.create_subscription(kind, f"{name}/{topic}", self.heard[name][topic].append, STREAM)
+        states = self.heard[name]["state"] = []
+        self.node.create_subscription(EstimatorState, f"{name}/state", states.append, LATCHED)
+        return self.heard[name]
+
+    def call(self, kind: type, service: str, patience: float = 10.0, **request):
+        """The response of a service."""
+        client = self.node.create_client(kind, service)
+        self.spin_until(client.service_is_ready, f"there is a service {service}", patience)
+        call = client.call_async(kind.Request(**request))
+        self.spin_until(call.done, f"{service} answers", patience)
+        self.node.destroy_client(client)
+        return call.result()
 
     def wait_for(self, name: str, messages: int, patience: float = 10.0) -> dict[str, list]:
         """What was heard of an estimator, once it has said so much about parameters, residuals and forces."""

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from crash_msgs.msg import Answer
 from helpers_estimation import oscillator_recording
 from helpers_estimator_node import TIME_ZERO, Stage, empty_samples, joined
 from numpy.testing import assert_array_equal
@@ -16,6 +17,7 @@ from crash_estimator.core.methods import make_estimator
 from crash_estimator.model_file import load_model
 from crash_estimator.nodes import estimator_node
 from crash_replay.bag import read_bag
+from crash_replay.qos import LATCHED
 from crash_replay.recording import Recording, Test
 from crash_replay.ros_messages import stamp_ns
 
@@ -118,7 +120,8 @@ def test_lost_samples_are_counted_and_said(stage, model, recording, capfd):
     stage.send(recording, 103, 200)
     heard = stage.wait_for("estimator", 197)
     lost = [(m.number, m.value, m.text) for m in heard["events"] if m.kind == "lost"]
-    assert lost == [(103, 3.0, "3 samples before number 103 were not seen")]
+    text = "3 samples before number 103 were not seen; the estimates rest on every sample from number 103 on"
+    assert lost == [(103, 3.0, text)]
     assert capfd.readouterr().err.count("3 samples before number 103 were not seen") == 1
 
 
@@ -176,6 +179,34 @@ def test_a_model_that_does_not_fit_the_test_is_one_line_and_the_next_test_is_wel
     assert_same(stage.wait_for("estimator", 35), offline(model, recording, "constrained_kalman"))
 
 
+def test_every_message_is_answered_whatever_becomes_of_it(stage, model, recording):
+    """A replay in lock-step waits for the answer, which comes when all that there is to say on the samples is published."""
+    answers = []
+    node = stage.add_estimator("mrls", model=model, method="mrls")
+    stage.node.create_subscription(Answer, "answers", answers.append, LATCHED)
+
+    def answer_to(start, stop, run=0):
+        before = len(answers)
+        stage.send(recording, start, stop, block=stop - start, run=run)
+        stage.spin_until(lambda: len(answers) > before, "an answer comes")
+        return answers[-1].number, answers[-1].run, answers[-1].missed
+
+    assert answer_to(0, 10) == (9, 0, 0)  # there is no test yet
+    stage.send_test(recording)
+    for start in range(0, 100, 10):
+        assert answer_to(start, start + 10) == (start + 9, 0, 0)
+        stage.spin(0.02)
+        assert stage.heard["mrls"]["parameters"][-1].number == start
+    assert answer_to(95, 100) == (99, 0, 0)  # once more
+    assert answer_to(103, 113) == (112, 0, 3)
+    node.stopped = True
+    assert answer_to(113, 120) == (119, 0, 3)
+    assert answer_to(50, 60, run=1) == (59, 1, 3)
+    stage.samples.publish(empty_samples(7, [1.0, 2.0]))  # of another test
+    stage.spin_until(lambda: answers[-1].number == 7, "an answer comes")
+    assert {answer.node for answer in answers} == {"/mrls"}
+
+
 def test_samples_of_another_test_are_left_out_with_an_error(stage, model, recording, capfd):
     stage.add_estimator(model=model)
     stage.send_test(recording)
@@ -205,7 +236,7 @@ def test_each_structure_live_from_the_real_replay(stage, bag, name):
     for method in methods:
         stage.add_estimator(method, model=name, method=method)
     path = BAGS / f"{bag}.mcap"
-    stage.replay(path, wait_for=len(methods))
+    stage.replay(path, wait_for=len(methods), rate=0.5)
     recording = read_bag(path)
     for method in methods:
         heard = stage.wait_for(method, len(recording), patience=25.0)

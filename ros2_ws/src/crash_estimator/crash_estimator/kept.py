@@ -1,6 +1,6 @@
 """The samples of a test that have been seen, by their numbers, in whatever order and however often they came."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -42,15 +42,6 @@ class Kept:
         self.time_ns = np.zeros(0, dtype=np.int64)
         self.values = np.zeros((0, len(test.channels)))
         self._grow(max(expected, 1))
-
-    def put(self, samples: Sequence[Sample]) -> None:
-        """Consecutive samples."""
-        first, end = samples[0].number, samples[-1].number + 1
-        if end > len(self.seen):
-            self._grow(max(end, 2 * len(self.seen)))
-        self.seen[first:end] = True
-        self.time_ns[first:end] = [sample.time_ns for sample in samples]
-        self.values[first:end] = [sample.values for sample in samples]
 
     def put_rows(self, rows: Rows) -> None:
         first, end = rows.number, rows.end

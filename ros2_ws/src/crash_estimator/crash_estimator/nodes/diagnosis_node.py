@@ -1,15 +1,15 @@
 """`diagnosis`: says, while a test is replayed, which physical effect the model lacks, and where it fails.
 
-Subscribes to `test` and `samples`; publishes `~/ranking`, `~/misfit` and `~/revisions` as the samples come, and after
-the last one the offline answer. Adding an effect, or taking one out, makes a new revision of its model.
+Subscribes to `test` and `samples` (or `channels/<name>`, from rosbag2's player); publishes `~/ranking`, `~/misfit` and
+`~/revisions` as the samples come, and after the last one the offline answer. Adding an effect, or taking one out, makes
+a new revision of its model, and the same question is asked of it on the samples that are kept.
 """
 
 import sys
 from collections.abc import Callable
 
-import numpy as np
 import rclpy
-from crash_msgs.msg import Misfit, Ranking, Residuals, Samples, TestInfo
+from crash_msgs.msg import Samples, TestInfo
 from crash_msgs.srv import AddEffect, RemoveEffect
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import ParameterException
@@ -20,9 +20,9 @@ from rclpy.subscription import Subscription
 from rclpy.task import Future
 
 from crash_replay.bag import read_bag
-from crash_replay.qos import EVERY_SAMPLE, LATCHED, SAID
+from crash_replay.qos import EVERY_SAMPLE, LATCHED
 from crash_replay.recording import RecordingError
-from crash_replay.ros_messages import samples_from_msg, stamp, stamp_ns, test_from_msg
+from crash_replay.ros_messages import stamp, stamp_ns, test_from_msg
 from crash_replay.ros_runtime import acknowledge_promptly, spin
 
 from ..core.diagnosis.live_answer import LiveAnswer
@@ -31,12 +31,15 @@ from ..core.effects.change import remove_effect
 from ..core.effects.user import load_effects
 from ..core.kinematics import Kinematics
 from ..core.structure import ModelError, Structure
-from ..kept import Kept
+from ..kept import Kept, Rows
 from ..model_file import load_model, ready_models
-from .diagnosis_messages import Moment, misfit_message, ranking_message, revision_message, revision_name
-from .diagnosis_story import Told, story
+from .asking import Asking
+from .channel_feed import ChannelFeed
+from .diagnosis_messages import Moment
+from .diagnosis_telling import Telling
 from .diagnosis_worker import Task, Worker, WorkerError
 from .effect_requests import request_of, with_effect
+from .samples import rows_of
 
 LOOK = 0.02
 """s of wall clock between two looks whether an answer has come."""
@@ -55,30 +58,29 @@ class DiagnosisNode(Node):
         every = self._declared("every", 0.002, "s of the crash between two rankings")
         self.adds = self._declared("add_first", False, "add the first effect that a final answer names, once")
         estimators = self._declared("estimators", [""], "names of estimators that it is added to as well")
+        replay = self._declared("replay", "replay", "node that samples are asked of which were missed")
         if not model:
             raise ModelError(f"parameter model is not set: give a .yaml file, or one of {', '.join(ready_models())}")
         self.every_ns = round(every * 1e9)
-        self.given = self.structure = load_model(model)
+        self.structure, self.revision = load_model(model), 0
         self.effects = EFFECTS | (load_effects(effects) if effects else {})
         self.bags = [bag for bag in bags if bag]
         for bag in self.bags:
             Kinematics(self.structure, read_bag(bag).test)
-        self.revision = 0
         self.kept: Kept | None = None  # None: no test yet, or one that the model does not fit
         self.time_zero = 0  # stamp of the impact, ns
         self.run, self.total, self.end = 0, 0, 0  # samples of the test; number of the next sample
         self.asked: Moment | None = None  # what the last task is, or was, about; None: something has changed since
-        self.drawn = 0  # number of the first sample that no curve has been published of in this pass
         self.stopped = False  # by what nothing can be said about
+        self.cannot_be_had = False  # what was missed in this pass
         self.finals: dict[tuple[int, int], LiveAnswer] = {}  # by revision and samples missing
-        self.told: dict[int, Told] = {}  # by revision
-        self.ranking_out = self.create_publisher(Ranking, "~/ranking", SAID)
-        self.misfit_out = self.create_publisher(Misfit, "~/misfit", SAID)
-        self.revisions_out = self.create_publisher(Residuals, "~/revisions", SAID)
-        self.also_add = {name: self.create_client(AddEffect, f"{name}/add_effect") for name in estimators if name}
+        self.telling = Telling(self, self.structure)
         self.worker = Worker(self.structure, effects, self.bags)
+        self.also_add = {name: self.create_client(AddEffect, f"{name}/add_effect") for name in estimators if name}
         self.create_service(AddEffect, "~/add_effect", self._on_add_effect)
         self.create_service(RemoveEffect, "~/remove_effect", self._on_remove_effect)
+        self.asking = Asking(self, f"{replay}/get_samples", self._on_samples_again)
+        self.feed = ChannelFeed(self, "samples", self._on_feed_begins, self._on_feed)
         self.create_subscription(TestInfo, "test", self._on_test, LATCHED)
         self.samples_in: Subscription | None = None  # a replay that waits for it begins when answers can come
         self.create_timer(LOOK, self._look)
@@ -90,9 +92,12 @@ class DiagnosisNode(Node):
         self.worker.close()
         super().destroy_node()
 
+    # what comes
+
     def _on_test(self, message: TestInfo) -> None:
         self._begin_anew()
-        self.kept, self.finals, self.told = None, {}, {}
+        self.kept, self.finals = None, {}
+        self.telling.begin_test()
         try:
             test = test_from_msg(message)
             Kinematics(self.structure, test)
@@ -101,89 +106,107 @@ class DiagnosisNode(Node):
             return
         self.kept, self.total, self.end = Kept(test, message.samples), message.samples, 0
         self.time_zero = stamp_ns(message.time_zero)
-        self.get_logger().info(f"test {test.id}: model {self._name()}, with {len(self.bags)} other recordings")
+        name = self.telling.name(self.structure)
+        self.get_logger().info(f"test {test.id}: model {name}, with {len(self.bags)} other recordings")
+        self.feed.set_test(message)
 
     def _on_samples(self, message: Samples) -> None:
-        if self.kept is None:
+        if self.kept is None or not message.time_ns:
             return
         try:
-            samples = samples_from_msg(message)
-            self.kept.put(samples)
-        except (RecordingError, ValueError) as error:
-            self.get_logger().error(f"{error}: left out; is there a second replay, of another test?")
+            rows = rows_of(message)
+            self.kept.put_rows(rows)
+        except ValueError as error:
+            self.get_logger().error(
+                f"samples from number {message.number}: {error}: left out; is there a second replay, of another test?"
+            )
             return
-        end = samples[-1].number + 1
         if message.run != self.run or message.number == 0:
             self._begin_anew()
-            self.run, self.end = message.run, end
-        self.end = max(self.end, end)
+            self.run, self.end = message.run, rows.end
+        self.end = max(self.end, rows.end)
+
+    def _on_feed_begins(self, renumbered: bool) -> None:
+        if self.kept is None:
+            return
+        if renumbered:
+            self.kept = Kept(self.kept.test, self.total)
+        self._begin_anew()
+        self.run, self.end = self.run + 1, 0
+
+    def _on_feed(self, rows: Rows) -> None:
+        if self.kept is not None:
+            self.kept.put_rows(rows)
+            self.end = max(self.end, rows.end)
+
+    def _on_samples_again(self, rows: Rows | None) -> None:
+        if rows is None:
+            self.cannot_be_had = True
+        elif self.kept is not None:
+            self.kept.put_rows(rows)
 
     def _begin_anew(self) -> None:
         """What was asked is no longer the question."""
-        self.asked, self.stopped, self.drawn = None, False, 0
+        self.asked, self.stopped, self.cannot_be_had = None, False, False
+        self.asking.forget()
+        self.telling.begin_pass()
         self.worker.drop()
+
+    # what is asked and said
 
     def _look(self) -> None:
         """Take the answer that has come, and ask the next question."""
         if self.samples_in is None and not self.worker.busy:
             self.samples_in = self.create_subscription(Samples, "samples", self._on_samples, EVERY_SAMPLE)
         reply = self.worker.reply()
-        if reply is not None:
-            if reply.error:
-                self.stopped = True
-                self.get_logger().error(f"{reply.error}; no more is said until the test, the pass or the model changes")
-            elif reply.answer is not None:
-                self._publish(self.asked, reply.answer)
-        if self.kept is not None and self.end and not self.worker.busy and not self.stopped:
+        if reply is not None and reply.error:
+            self.stopped = True
+            self.get_logger().error(f"{reply.error}; no more is said until the test, the pass or the model changes")
+        elif reply is not None and reply.answer is not None:
+            self._conclude(self.asked, reply.answer)
+        if self.kept is not None and self.end and not (self.worker.busy or self.asking.busy or self.stopped):
             self._ask()
 
     def _ask(self) -> None:
         time_ns = int(self.kept.time_ns[self.end - 1])
         asked, complete = self.asked, self.end == self.total
         new = asked is None or time_ns - asked.time_ns >= self.every_ns or (complete and asked.number < self.end - 1)
-        if not new and not (complete and not asked.final):
+        if not (new or (complete and not asked.final)) or not self._has_enough():
             return
-        missing = self.kept.missing(self.end)
-        if missing > TOLERATED * self.end:
-            self.stopped = True
-            self.get_logger().warning(
-                f"{missing} of {self.end} samples were not seen: nothing is said on this pass; seek to the start for a whole one"
-            )
-            return
-        at_stamp = stamp(self.time_zero + time_ns)
-        self.asked = Moment(self.run, self.end - 1, time_ns, at_stamp, self.structure, self.revision, final=not new)
-        known = self.finals.get((self.revision, missing)) if self.asked.final else None
+        at = stamp(self.time_zero + time_ns)
+        self.asked = Moment(self.run, self.end - 1, time_ns, at, self.structure, self.revision, final=not new)
+        known = self.finals.get((self.revision, self.kept.missing(self.end))) if self.asked.final else None
         if known:
-            self._publish(self.asked, known)
+            self._conclude(self.asked, known)
         else:
             self.worker.ask(Task(self.structure, self.kept.until(self.end), self.asked.final))
 
-    def _publish(self, at: Moment, answer: LiveAnswer) -> None:
-        self.ranking_out.publish(ranking_message(at, answer))
-        self.misfit_out.publish(misfit_message(at, answer))
-        numbers = self.kept.numbers(at.number + 1)[-len(answer.fits[0].time_ns) :]
-        rows = slice(0 if at.final else int(np.searchsorted(numbers, self.drawn)), None)
-        self.drawn = at.number + 1
-        for fit in answer.fits:
-            name = revision_name(self.given, at.structure, fit.effects)
-            first = self.time_zero + int(fit.time_ns[rows][0])
-            self.revisions_out.publish(revision_message(at, name, int(numbers[rows][0]), stamp(first), fit, rows))
-        if at.final:
-            self._conclude(at, answer)
+    def _has_enough(self) -> bool:
+        """Whether next to no sample is missing; asks for those that are."""
+        gap = self.kept.gap(0, self.end)
+        if gap and not self.cannot_be_had and self.asking.ask(*gap):
+            return False
+        missing = self.kept.missing(self.end)
+        self.stopped = missing > TOLERATED * self.end
+        if self.stopped:
+            self.get_logger().warning(
+                f"{missing} of {self.end} samples were not seen: nothing is said on this pass; "
+                "seek to the start for a whole one"
+            )
+        return not self.stopped
 
     def _conclude(self, at: Moment, answer: LiveAnswer) -> None:
-        missing = self.kept.missing(at.number + 1)
-        self.finals[at.revision, missing] = answer
-        self.told[at.revision] = Told(self._name(), answer)
-        for line in story([told for _, told in sorted(self.told.items())]):
-            self.get_logger().info(line)
-        if missing:
-            self.get_logger().warning(f"{missing} samples were not seen: the offline answer may differ")
+        self.telling.tell(at, answer, self.kept, self.time_zero)
+        if not at.final:
+            return
+        self.finals[at.revision, self.kept.missing(at.number + 1)] = answer
         if self.adds and answer.found:
             self.adds = False
             request = request_of(answer.found[0])
             self._add_to_estimators(request)
             self.get_logger().info(self._on_add_effect(request, AddEffect.Response()).message)
+
+    # the model's revisions
 
     def _add_to_estimators(self, request: AddEffect.Request) -> None:
         for name, client in self.also_add.items():
@@ -194,17 +217,18 @@ class DiagnosisNode(Node):
 
     def _say(self, name: str, response: AddEffect.Response) -> None:
         log = self.get_logger()
-        (log.info if response.success else log.error)(f"{name}: {response.message}")
+        (log.info if response.success else log.warning)(f"{name}: {response.message}")
 
     def _on_add_effect(self, request: AddEffect.Request, response: AddEffect.Response) -> AddEffect.Response:
         test = self.kept.test if self.kept else None
         return self._change(lambda: with_effect(self.structure, request, self.effects, test), response)
 
-    def _on_remove_effect(self, request: RemoveEffect.Request, response: RemoveEffect.Response) -> RemoveEffect.Response:
+    def _on_remove_effect(
+        self, request: RemoveEffect.Request, response: RemoveEffect.Response
+    ) -> RemoveEffect.Response:
         return self._change(lambda: remove_effect(self.structure, request.effect, request.target), response)
 
     def _change(self, change: Callable[[], Structure], response):
-        """The same question of another model, on the samples that are kept."""
         try:
             self.structure = change()
         except ModelError as error:
@@ -212,11 +236,8 @@ class DiagnosisNode(Node):
             return response
         self.revision += 1
         self._begin_anew()
-        response.success, response.message = True, f"revision {self.revision}: {self._name()}"
+        response.success, response.message = True, f"revision {self.revision}: {self.telling.name(self.structure)}"
         return response
-
-    def _name(self) -> str:
-        return revision_name(self.given, self.structure, ())
 
 
 def main() -> int:

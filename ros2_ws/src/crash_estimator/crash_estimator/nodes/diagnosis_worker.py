@@ -25,12 +25,8 @@ from ..core.structure import ModelError, Structure
 NICENESS = 10
 """On a busy machine the estimators go first, the ranking comes later."""
 
-
 TRY_OUT = 200
 """Samples of noise, at 10 kHz."""
-
-ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
-"""Its matrices are small: more threads wait for each other, twice as long on an idle machine, ten times on a busy one."""
 
 
 class Task(NamedTuple):
@@ -85,7 +81,7 @@ class Worker:
     """An Answerer in another process, which is asked without waiting; one task at a time."""
 
     def __init__(self, structure: Structure, effects_file: str = "", bags: Sequence[str] = ()):
-        """structure: to get ready with; effects_file: a user's own effects; bags: other recordings of the same structure."""
+        """structure: to get ready with; effects_file: a user's own; bags: other recordings of the same structure."""
         self.setup = structure, effects_file, tuple(bags)
         self._start()
 
@@ -129,8 +125,7 @@ class Worker:
         self._pipe, its = Pipe()
         # run as __main__ it would send classes of that name
         command = [sys.executable, "-c", f"from {__name__} import main; main({its.fileno()})"]
-        environment = ONE_THREAD | os.environ
-        self.process = subprocess.Popen(command, pass_fds=[its.fileno()], stdin=subprocess.DEVNULL, env=environment)
+        self.process = subprocess.Popen(command, pass_fds=[its.fileno()], stdin=subprocess.DEVNULL)
         its.close()
         self._pipe.send(self.setup)
         self.busy, self.wanted, self.long = True, False, False  # until it says that it is there

@@ -2,67 +2,65 @@
 
 from array import array
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import TypeVar
 
 import numpy as np
 from builtin_interfaces.msg import Time
 from crash_msgs.msg import Event, Forces, Parameters, Residuals
 
+from crash_replay.ros_messages import add_ns
+
 from ..core.estimate import Description, Estimate, ParameterStatus
+from ..following.columns import Columns
+
+Message = TypeVar("Message", Parameters, Residuals, Forces)
 
 
 class EstimateMessages:
-    """Makes the four messages of a block of estimates; names and units are set once."""
+    """Makes the messages of a block of estimates: one of each kind, filled again, so that it holds until the next call.
 
-    def __init__(self, description: Description):
+    Names and units are set once, for to make a message anew costs as much as to estimate.
+    """
+
+    def __init__(self, description: Description, revision: int = 0):
+        d = description
+        ends = ["-".join(pair) for pair in d.between]
+        self._parameters = Parameters(name=[*d.parameters, *d.extra], unit=[*d.parameter_units, *d.extra_units])
+        self._residuals = Residuals(name=list(d.equations), unit=list(d.equation_units))
+        self._forces = Forces(element=list(d.elements), between=ends, body=list(d.bodies), mass=array("d", d.masses))
         self.description = description
+        for message in (self._parameters, self._residuals, self._forces):
+            message.model, message.method, message.revision = d.model, d.method, revision
 
-    def parameters(self, stamp: Time, run: int, estimates: Sequence[Estimate]) -> Parameters:
-        d = self.description
-        message = Parameters(name=[*d.parameters, *d.extra], unit=[*d.parameter_units, *d.extra_units])
-        self._head(message, stamp, run, estimates)
-        if d.extra:
-            estimates = [_with_extra(estimate) for estimate in estimates]
-        message.value = _rows(estimates, "value" if d.extra else "parameters")
-        message.std = _rows(estimates, "std")
-        message.status = _bytes(estimates, "status")
-        return message
+    def parameters(self, stamp: Time, run: int, columns: Columns) -> Parameters:
+        return _filled(self._parameters, stamp, run, columns)
 
-    def residuals(self, stamp: Time, run: int, estimates: Sequence[Estimate]) -> Residuals:
-        d = self.description
-        message = Residuals(name=list(d.equations), unit=list(d.equation_units))
-        self._head(message, stamp, run, estimates)
-        for field in ("measured", "predicted", "innovation", "residual", "residual_std"):
-            setattr(message, field, _rows(estimates, field))
-        variances = np.array([np.diagonal(estimate.innovation_covariance) for estimate in estimates])
-        message.innovation_std = array("d", np.sqrt(variances).tobytes())
-        return message
+    def residuals(self, stamp: Time, run: int, columns: Columns) -> Residuals:
+        return _filled(self._residuals, stamp, run, columns)
 
-    def forces(self, stamp: Time, run: int, estimates: Sequence[Estimate]) -> Forces:
-        d = self.description
-        message = Forces(element=list(d.elements), between=["-".join(ends) for ends in d.between], body=list(d.bodies))
-        self._head(message, stamp, run, estimates)
-        message.mass = array("d", d.masses)
-        for field in ("crush", "rate", "force", "force_std", "displacement", "velocity", "acceleration"):
-            setattr(message, field, _rows(estimates, field))
-        message.state = _bytes(estimates, "state")
-        return message
+    def forces(self, stamp: Time, run: int, columns: Columns) -> Forces:
+        return _filled(self._forces, stamp, run, columns)
 
-    def events(self, stamp: Time, run: int, estimate: Estimate) -> list[Event]:
+    def events(self, stamp: Time, run: int, columns: Columns) -> list[Event]:
+        """stamp: of the first sample."""
         messages = []
-        for event in estimate.events:
-            message = Event(run=run, number=estimate.number, time=estimate.time_ns * 1e-9, **event._asdict())
-            message.header.stamp = stamp
+        for row, event in columns.events:
+            time_ns = int(columns.time_ns[row])
+            message = Event(run=run, number=columns.number + row, time=time_ns * 1e-9, **event._asdict())
+            message.header.stamp = add_ns(stamp, time_ns - int(columns.time_ns[0]))
             messages.append(message)
         return messages
 
-    def _head(self, message, stamp: Time, run: int, estimates: Sequence[Estimate]) -> None:
-        message.header.stamp = stamp
-        message.run = run
-        message.number = estimates[0].number
-        message.time_ns = array("q", [estimate.time_ns for estimate in estimates])
-        message.model = self.description.model
-        message.method = self.description.method
+
+def _filled(message: Message, stamp: Time, run: int, columns: Columns) -> Message:
+    message.header.stamp = stamp
+    message.run = run
+    message.number = columns.number
+    message.time_ns = array("q", columns.time_ns.tobytes())
+    for field in FIELDS[type(message)]:
+        table = columns.of[field]
+        setattr(message, field, array("B" if table.dtype == np.uint8 else "d", table.tobytes()))
+    return message
 
 
 def description_from(parameters: Parameters, residuals: Residuals, forces: Forces) -> Description:
@@ -133,23 +131,6 @@ def _samples(message: Parameters | Residuals | Forces) -> Iterator[tuple[int, di
         yield message.number + k, {"time_ns": message.time_ns[k]} | {field: rows[k] for field, rows in tables.items()}
 
 
-class _Row(NamedTuple):
-    """Parameters and what the method knows besides, as they travel."""
-
-    value: np.ndarray
-    std: np.ndarray
-    status: np.ndarray
-
-
-def _with_extra(estimate: Estimate) -> _Row:
-    besides = np.full(len(estimate.extra), ParameterStatus.METHOD, dtype=np.uint8)
-    return _Row(
-        np.concatenate([estimate.parameters, estimate.extra]),
-        np.concatenate([estimate.std, estimate.extra_std]),
-        np.concatenate([estimate.status, besides]),
-    )
-
-
 def _parameters(status: Sequence[int], width: int) -> int:
     """How many of a sample's values are parameters of the model; the rest is of the method."""
     return width - int(np.count_nonzero(np.asarray(status[:width]) == ParameterStatus.METHOD))
@@ -165,12 +146,3 @@ def _ends(between: str, bodies: tuple[str, ...]) -> tuple[str, str]:
     """The two bodies of "body_a-body_b", where a name may have a hyphen itself."""
     pairs = ((a, b) for a in bodies for b in bodies if f"{a}-{b}" == between)
     return next(pairs, (between, ""))
-
-
-def _rows(estimates: Sequence[Estimate], field: str) -> array:
-    """A (p,) field of n estimates as one row-major array of n * p doubles."""
-    return array("d", b"".join(getattr(estimate, field).tobytes() for estimate in estimates))
-
-
-def _bytes(estimates: Sequence[Estimate], field: str) -> array:
-    return array("B", b"".join(getattr(estimate, field).tobytes() for estimate in estimates))

@@ -1,15 +1,20 @@
 """`estimator`: follows the replayed samples with one model and one method, and publishes what it finds.
 
-Subscribes to `test` and `samples`; publishes `~/parameters`, `~/residuals`, `~/forces`, `~/events`.
+Subscribes to `test` and `samples`, or to `channels/<name>` where rosbag2's player plays the bag; publishes
+`~/parameters`, `~/residuals`, `~/forces`, `~/events` and `~/state`, and answers on `answers` what it has done with.
 Several run side by side under different names (`--ros-args -r __node:=mrls`).
 """
 
 import sys
-from typing import Any
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import rclpy
-from crash_msgs.msg import Event, Forces, Parameters, Residuals, Samples, TestInfo
+from builtin_interfaces.msg import Time
+from crash_msgs.msg import EstimatorState, Samples, TestInfo
+from crash_msgs.srv import AddEffect, RemoveEffect
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
@@ -18,17 +23,39 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from crash_replay.qos import EVERY_SAMPLE, LATCHED, STREAM
-from crash_replay.recording import Channel, RecordingError, Sample, Test
-from crash_replay.ros_messages import add_ns, samples_from_msg, test_from_msg
+from crash_replay.qos import EVERY_SAMPLE, LATCHED, UNLATCHED
+from crash_replay.recording import Channel, RecordingError, Test
+from crash_replay.ros_messages import add_ns, test_from_msg
 from crash_replay.ros_runtime import acknowledge_promptly, spin
 
 from ..cli.common import parse_settings
-from ..core.estimate import Estimate
+from ..core.effects import EFFECTS
+from ..core.effects.change import remove_effect
+from ..core.effects.user import load_effects
 from ..core.methods import METHODS, AnyEstimator, make_estimator
-from ..core.structure import ModelError
+from ..core.structure import ModelError, Structure
+from ..following.again import estimated_again
+from ..following.arrivals import Arrival, Arrivals, missing_text
+from ..following.columns import FilterFailure
+from ..following.follower import Follower
+from ..kept import Kept, Rows
 from ..model_file import load_model, ready_models
-from .estimate_messages import EstimateMessages
+from .asking import Asking
+from .channel_feed import ChannelFeed
+from .effect_requests import with_effect
+from .estimator_topics import EstimatorTopics
+from .samples import MOST, rows_of, what_is_wrong
+
+
+@dataclass
+class Waiting:
+    """Samples that have come and are to be estimated."""
+
+    arrival: Arrival
+    run: int
+    stamp: Time  # of the first of them
+    sent_again: int = 0  # samples that were missing before them and have been got since
+    without: bool = False  # what is missing cannot be had
 
 
 class EstimatorNode(Node):
@@ -38,122 +65,242 @@ class EstimatorNode(Node):
         self.method = self._declared("method", "constrained_kalman", f"one of {', '.join(METHODS)}")
         model = self._declared("model", "", f"a .yaml file, or one of {', '.join(ready_models())}")
         settings = self._declared("settings", [""], "settings of the method, such as forgetting=0.98")
+        effects = self._declared("effects", "", "your own effects, a .py file; it is executed")
+        replay = self._declared("replay", "replay", "node that samples are asked of which were missed")
         self.settings = parse_settings([pair for pair in settings if pair])
         if self._declared("effective_mass", False, "find the masses that go with the accelerometers first"):
             self.settings["effective_mass"] = True
         if not model:
             raise ModelError(f"parameter model is not set: give a .yaml file, or one of {', '.join(ready_models())}")
-        self.structure = load_model(model)
-        self._try_out()
-        self.estimator: AnyEstimator | None = None
-        self.messages: EstimateMessages | None = None
-        self.channels = 0  # of the test
-        self.state: Any = None  # of the estimator; None: a pass over the recording is to begin
+        self.effects = EFFECTS | (load_effects(effects) if effects else {})
+        self.structure, self.revision = load_model(model), 0
+        self._try_out(self.structure)
+        self.test_message: TestInfo | None = None
+        self.unlatched: TestInfo | None = None  # come by itself, and to come once more if its publisher latches
+        self.follower: Follower | None = None  # None: no test yet, or one that the model does not fit
+        self.arrivals, self.waiting = Arrivals(), deque[Waiting]()
         self.stopped = False  # by numbers that no filter can go on with, until the next pass
-        self.run, self.next_number = 0, 0
-        self.parameters_out = self.create_publisher(Parameters, "~/parameters", STREAM)
-        self.residuals_out = self.create_publisher(Residuals, "~/residuals", STREAM)
-        self.forces_out = self.create_publisher(Forces, "~/forces", STREAM)
-        self.events_out = self.create_publisher(Event, "~/events", STREAM)
+        self.asked_again = 0  # samples
+        self.topics = EstimatorTopics(self)
         self.create_service(Trigger, "~/reset", self._on_reset)
+        self.create_service(AddEffect, "~/add_effect", self._on_add_effect)
+        self.create_service(RemoveEffect, "~/remove_effect", self._on_remove_effect)
+        self.asking = Asking(self, f"{replay}/get_samples", self._on_samples_again)
+        self.feed, self.feed_run = ChannelFeed(self, "samples", self._on_feed_begins, self._on_feed), -1
         self.create_subscription(TestInfo, "test", self._on_test, LATCHED)
+        self.create_subscription(TestInfo, "test", self._on_unlatched_test, UNLATCHED)
         self.create_subscription(Samples, "samples", self._on_samples, EVERY_SAMPLE)
 
     def _declared(self, name: str, default, description: str):
         return self.declare_parameter(name, default, ParameterDescriptor(description=description)).value
 
-    def _try_out(self) -> None:
+    def _make(self, structure: Structure, test: Test) -> AnyEstimator:
+        return make_estimator(structure, test, self.method, effects=self.effects, **self.settings)
+
+    def _try_out(self, structure: Structure) -> None:
         """One sample of a test that has just the model's channels: what is wrong with model or method shows now.
 
         It also gets the compiled code ready before the subscription that a replay waits for.
         """
-        channels = {name: Channel(name, quantity) for _, name, quantity in self.structure.channels()}
+        channels = {name: Channel(name, quantity) for _, name, quantity in structure.channels()}
         test = Test("try-out", tuple(channels.values()))
-        estimator = make_estimator(self.structure, test, self.method, **self.settings)
-        estimator.step(estimator.init(), Sample(0, 0, np.zeros(len(channels))))
+        rows = Rows(0, np.zeros(1, dtype=np.int64), np.zeros((1, len(channels))))
+        follower = Follower(self._make(structure, test), Kept(test))
+        follower.keep(rows)
+        follower.follow(rows)
+
+    def _on_unlatched_test(self, message: TestInfo) -> None:
+        """From a publisher that latches nothing: rosbag2's, of a bag without quality of service."""
+        if message != self.test_message:
+            self._begin_test(message)
+            self.unlatched = message
 
     def _on_test(self, message: TestInfo) -> None:
-        self.estimator = self.state = None
+        twice, self.unlatched = message == self.unlatched, None
+        again = self.feed.active and message == self.test_message  # rosbag2's player begins its bag once more
+        if not (twice or again):
+            self._begin_test(message)
+
+    def _begin_test(self, message: TestInfo) -> None:
+        self.test_message, self.follower = message, None
+        self._forget_waiting()
+        self.arrivals = Arrivals()
         try:
             test = test_from_msg(message)
-            self.estimator = make_estimator(self.structure, test, self.method, **self.settings)
+            estimator = self._make(self.structure, test)
         except (ModelError, RecordingError) as error:
             self.get_logger().error(f"{error}; nothing is estimated on this test")
             return
-        self.messages, self.channels = EstimateMessages(self.estimator.description), len(test.channels)
+        self.follower = Follower(estimator, Kept(test, message.samples))
+        self.topics.begin(estimator.description, self.revision, message.time_zero)
         self.get_logger().info(f"test {test.id}: model {self.structure.name}, method {self.method}")
+        self.feed.set_test(message)
 
     def _on_samples(self, message: Samples) -> None:
-        if self.estimator is None:
-            return
-        estimates = self._estimates(self._new_samples(message))
-        if not estimates:
-            return
-        stamp = add_ns(message.header.stamp, estimates[0].time_ns - message.time_ns[0])
-        self.parameters_out.publish(self.messages.parameters(stamp, self.run, estimates))
-        self.residuals_out.publish(self.messages.residuals(stamp, self.run, estimates))
-        self.forces_out.publish(self.messages.forces(stamp, self.run, estimates))
-        for estimate in estimates:
-            if estimate.events:
-                own = add_ns(stamp, estimate.time_ns - estimates[0].time_ns)
-                for event in self.messages.events(own, self.run, estimate):
-                    self.events_out.publish(event)
+        if self.follower is None or not self._fits(message):
+            return self._answer(message.run, message.number + max(0, len(message.time_ns) - 1))
+        self._receive(message.run, rows_of(message), message.header.stamp)
 
-    def _new_samples(self, message: Samples) -> list[Sample]:
-        """The message's samples that follow what has been seen; says so where some are missing or come again."""
-        expected, found = len(message.time_ns) * self.channels, len(message.values)
-        if not found or found != expected:
+    def _fits(self, message: Samples) -> bool:
+        wrong = what_is_wrong(message, len(self.follower.kept.test.channels), self.test_message.samples)
+        if wrong:
             self.get_logger().error(
-                f"samples from number {message.number}: expected {expected} values ({self.channels} channels), "
-                f"found {found}: left out; is there a second replay, of another test?"
+                f"samples from number {message.number}: {wrong}: left out; is there a second replay, of another test?"
             )
-            return []
-        samples = samples_from_msg(message)
-        if self.state is None or message.run != self.run or message.number == 0:
-            self.state, self.run, self.next_number, self.stopped = self.estimator.init(), message.run, 0, False
-        missing = message.number - self.next_number
-        if missing > 0:
-            self._lost(message, missing)
-        elif missing < 0:
+        return not wrong
+
+    def _on_feed_begins(self, renumbered: bool) -> None:
+        self.feed_run += 1
+        if renumbered and self.follower:
+            kept = self.follower.kept
+            self.follower = Follower(self.follower.estimator, Kept(kept.test, len(kept.seen)))
+
+    def _on_feed(self, rows: Rows) -> None:
+        if self.follower and rows.end <= MOST:
+            self._receive(self.feed_run, rows, add_ns(self.test_message.time_zero, int(rows.time_ns[0])))
+
+    def _receive(self, run: int, rows: Rows, stamp: Time) -> None:
+        arrival = self.arrivals.receive(run, rows)
+        if arrival.repeated:
             self.get_logger().warning(
-                f"samples from number {message.number} come after number {self.next_number - 1}: what was seen before "
-                "is left out; is there a second replay?"
+                f"samples from number {rows.number} come after number {rows.number + arrival.repeated - 1}: what was "
+                "seen before is left out; is there a second replay?"
             )
-            samples = samples[-missing:]
-        self.next_number = samples[-1].number + 1 if samples else self.next_number
-        return samples
+            if not len(arrival.rows.time_ns):
+                return self._answer(run, rows.end - 1)
+            stamp = add_ns(stamp, int(arrival.rows.time_ns[0] - rows.time_ns[0]))
+        self.follower.keep(arrival.rows)
+        self.waiting.append(Waiting(arrival, run, stamp))
+        self._work()
 
-    def _estimates(self, samples: list[Sample]) -> list[Estimate]:
-        estimates: list[Estimate] = []
-        for sample in [] if self.stopped else samples:
-            try:
-                self.state, estimate = self.estimator.step(self.state, sample)
-                if not np.isfinite(estimate.parameters).all():
-                    raise np.linalg.LinAlgError("the parameters are no longer finite")
-            except np.linalg.LinAlgError as error:
-                self.stopped = True
-                self.get_logger().error(
-                    f"sample {sample.number} at {sample.time * 1e3:.2f} ms: {self.method} cannot go on ({error}); "
-                    "it starts again with the next pass over the test, or with the service ~/reset"
-                )
-                break
-            estimates.append(estimate)
-        return estimates
+    def _on_samples_again(self, rows: Rows | None) -> None:
+        head = self.waiting[0]
+        if rows is None:
+            head.without = True
+        else:
+            self.follower.keep(rows)
+            head.sent_again += len(rows.time_ns)
+            self.asked_again += len(rows.time_ns)
+        self._work()
 
-    def _lost(self, message: Samples, count: int) -> None:
-        text = f"{count} samples before number {message.number} were not seen"
-        if self.next_number == 0:
-            text += ": the pass was joined late, its motion up to here is unknown; seek to the start for a whole one"
-        self.get_logger().warning(text)
-        event = Event(
-            run=message.run, number=message.number, kind="lost", target="samples", value=float(count), text=text
+    def _forget_waiting(self) -> None:
+        self.asking.begin_test()
+        self.waiting.clear()
+        self.stopped = False
+
+    def _work(self) -> None:
+        """Estimate what waits, unless what was missed before it may still come."""
+        while self.waiting and not self.asking.busy:
+            head = self.waiting[0]
+            if head.arrival.begins:
+                self.stopped = False
+                self._go_back_before_reset()
+            gap = None if self.stopped or head.without else self.follower.gap(head.arrival.rows.number)
+            if gap and self.asking.ask(*gap):
+                return
+            self._tell_of_missing(head)
+            self._estimate(head)
+            self.waiting.popleft()
+            self._answer(head.run, head.arrival.rows.end - 1)
+
+    def _go_back_before_reset(self) -> None:
+        if self.follower.floor:
+            self.follower = Follower(self.follower.estimator, self.follower.kept)
+
+    def _estimate(self, samples: Waiting) -> None:
+        if self.stopped:
+            return
+        try:
+            columns = self.follower.follow(samples.arrival.rows)
+        except FilterFailure as failure:
+            self.stopped, columns = True, failure.done
+            self.get_logger().error(
+                f"{failure}; it starts again with the next pass over the test, or with the service ~/reset"
+            )
+        if columns:
+            self.topics.estimates(samples.run, columns, samples.stamp)
+
+    def _answer(self, run: int, number: int) -> None:
+        self.topics.answer(run, number, self.arrivals.missed)
+
+    def _tell_of_missing(self, samples: Waiting) -> None:
+        """Say what did not come before these samples, and what the estimates rest on."""
+        arrival, number = samples.arrival, samples.arrival.rows.number
+        if not (arrival.lost or arrival.begins or samples.sent_again):
+            return
+        holds_from = self.follower.holds_from(number)
+        missing = arrival.lost or samples.sent_again + self.follower.kept.missing(number)
+        if missing:
+            text = missing_text(number, missing, samples.sent_again, holds_from, arrival.begins)
+            self.get_logger().warning(text)
+            self.topics.event("lost", "samples", float(missing), text, samples.run, number, samples.stamp)
+        self._publish_state(samples.run, number, samples.stamp)
+
+    def _publish_state(self, run: int, number: int, stamp: Time) -> None:
+        message = EstimatorState(
+            run=run,
+            number=number,
+            holds_from=self.follower.holds_from(number),
+            missed=self.arrivals.missed,
+            asked_again=self.asked_again,
+            model=self.structure.name,
+            method=self.method,
+            revision=self.revision,
+            effects=self._effects(),
         )
-        event.header.stamp = message.header.stamp
-        event.time = message.time_ns[0] * 1e-9
-        self.events_out.publish(event)
+        message.header.stamp = stamp
+        self.topics.state.publish(message)
+
+    def _effects(self) -> list[str]:
+        return [f"{spec.type} on {spec.target}" for spec in self.structure.effects]
+
+    def _on_add_effect(self, request: AddEffect.Request, response: AddEffect.Response) -> AddEffect.Response:
+        test = self.follower.kept.test if self.follower else None
+        return self._change(lambda: with_effect(self.structure, request, self.effects, test), response)
+
+    def _on_remove_effect(
+        self, request: RemoveEffect.Request, response: RemoveEffect.Response
+    ) -> RemoveEffect.Response:
+        return self._change(lambda: remove_effect(self.structure, request.effect, request.target), response)
+
+    def _change(self, change: Callable[[], Structure], response):
+        """Go on with another model, as if it had been this one from the first sample on."""
+        old, done = self.follower, ""
+        try:
+            structure = change()
+            self._try_out(structure)
+            if old:
+                self.follower, done = estimated_again(old, self._make(structure, old.kept.test))
+        except (ModelError, RecordingError) as error:
+            response.message = " ".join(str(error).split())
+            return response
+        except FilterFailure as failure:
+            response.message = f"{failure}: model {self.structure.name} stays as it is"
+            return response
+        self.structure, self.revision, self.stopped = structure, self.revision + 1, False
+        name = f"{structure.name} with {', '.join(self._effects()) or 'no effect'}"
+        response.success, response.message = True, f"revision {self.revision}: {name}" + (f"; {done}" if done else "")
+        self.get_logger().info(response.message)
+        if old:
+            self._tell_of_change(response.message)
+        elif self.test_message:  # which the model may now fit
+            self._begin_test(self.test_message)
+        return response
+
+    def _tell_of_change(self, text: str) -> None:
+        zero, number, run = self.test_message.time_zero, self.follower.position, self.arrivals.run
+        at = add_ns(zero, int(self.follower.kept.time_ns[max(0, number - 1)]))
+        self.topics.begin(self.follower.estimator.description, self.revision, zero)
+        self.topics.event("effect", "model", float(self.revision), text, run, number, at)
+        self._publish_state(run, number, at)
 
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self.state = None  # the samples that follow begin a pass that was joined late
+        if self.follower:
+            waiting = list(self.waiting)
+            self._forget_waiting()
+            self.follower = Follower(self.follower.estimator, self.follower.kept, floor=self.arrivals.next)
+            for samples in waiting:  # a replay in lock-step goes on
+                self._answer(samples.run, samples.arrival.rows.end - 1)
         response.success, response.message = True, "the next sample starts from the model's initial values"
         return response
 

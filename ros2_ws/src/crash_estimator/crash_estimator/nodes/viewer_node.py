@@ -1,7 +1,8 @@
 """`viewer`: shows what the estimators say in Rerun, live, and writes it to a .rrd file.
 
 Subscribes to `test`, `replay_state`, each estimator's `parameters`, `residuals`, `forces` and `events`, and the
-diagnosis' `ranking`, `misfit` and `revisions`. Callbacks only queue what comes; decoding, drawing and waiting for a slow screen happen in the recorder's own thread.
+diagnosis' `ranking`, `misfit` and `revisions`. Callbacks only queue what comes; decoding, drawing and waiting for a
+slow screen happen in the recorder's own thread.
 """
 
 import os
@@ -45,7 +46,7 @@ class ViewerNode(Node):
         say = self.get_logger().info
         names = self._declared("estimators", [""], "names of estimators; empty: all there are")
         self.estimators = [name for name in names if name]
-        models = self._declared("models", [""], "files of models that are not ready ones, for the validation at the end")
+        models = self._declared("models", [""], "files of models other than the ready ones, for the validation")
         port = self._declared("port", 9876, "of the gRPC server on 127.0.0.1 that viewers connect to")
         rrd = self._declared("rrd", "crash.rrd", "file that the recording is written to; empty: none")
         memory = self._declared("memory_limit", "1GiB", "what the server keeps for viewers that come late")

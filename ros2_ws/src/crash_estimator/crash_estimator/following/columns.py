@@ -1,0 +1,115 @@
+"""Estimates of consecutive samples as columns, the form in which they travel: from the compiled recursion's rows as
+they are, or from `Estimate`s."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core.compiled.estimator import CompiledEstimator, CompiledState
+from ..core.estimate import Estimate, Event, ParameterStatus
+from ..core.methods import AnyEstimator
+from ..kept import Rows
+
+FIELDS = (
+    *("status", "measured", "predicted", "innovation", "residual", "residual_std"),
+    *("crush", "rate", "force", "force_std", "state", "displacement", "velocity", "acceleration"),
+)
+"""Of an `Estimate`, taken as they are."""
+
+
+class Columns(NamedTuple):
+    """Estimates of the samples number, number + 1, ..."""
+
+    number: int
+    time_ns: np.ndarray  # (k,) int64
+    of: dict[str, np.ndarray]  # field of the messages -> (k, width)
+    events: Sequence[tuple[int, Event]]  # row, event
+
+    def __len__(self) -> int:
+        return len(self.time_ns)
+
+
+class FilterFailure(Exception):
+    """A filter that cannot go on; `done` is what it has said before that."""
+
+    def __init__(self, method: str, number: int, time_ns: int, reason: str, done: Columns | None):
+        super().__init__(f"sample {number} at {time_ns * 1e-6:.2f} ms: {method} cannot go on ({reason})")
+        self.done = done
+
+
+def follow(estimator: AnyEstimator, state: Any, rows: Rows) -> tuple[Any, Columns]:
+    """Fold consecutive samples, at least one; raises FilterFailure.
+
+    However the samples are shared out to calls, states and estimates are the same to the last bit.
+    """
+    if isinstance(estimator, CompiledEstimator):
+        return _follow_compiled(estimator, state, rows)
+    estimates: list[Estimate] = []
+    for sample in rows.samples():
+        try:
+            state, estimate = estimator.step(state, sample)
+            if not np.isfinite(estimate.parameters).all():
+                raise np.linalg.LinAlgError(NOT_FINITE)
+        except np.linalg.LinAlgError as error:
+            done = columns_of(estimates) if estimates else None
+            raise FilterFailure(estimator.description.method, sample.number, sample.time_ns, str(error), done) from None
+        estimates.append(estimate)
+    return state, columns_of(estimates)
+
+
+NOT_FINITE = "the parameters are no longer finite"
+
+
+def columns_of(estimates: Sequence[Estimate]) -> Columns:
+    """Of consecutive estimates, at least one."""
+    of = {name: np.array([getattr(e, name) for e in estimates]) for name in FIELDS}
+    besides = np.full(len(estimates[0].extra), ParameterStatus.METHOD, dtype=np.uint8)
+    of["value"] = np.array([np.concatenate([e.parameters, e.extra]) for e in estimates])
+    of["std"] = np.array([np.concatenate([e.std, e.extra_std]) for e in estimates])
+    of["status"] = np.hstack([of["status"], np.tile(besides, (len(estimates), 1))])
+    of["innovation_std"] = np.sqrt(np.array([np.diagonal(e.innovation_covariance) for e in estimates]))
+    events = [(row, event) for row, estimate in enumerate(estimates) for event in estimate.events]
+    return Columns(estimates[0].number, np.array([e.time_ns for e in estimates]), of, events)
+
+
+def _follow_compiled(
+    estimator: CompiledEstimator, state: CompiledState, rows: Rows
+) -> tuple[CompiledState, Columns]:
+    before = state.last_row
+    state, table = estimator.follow(state, rows.time_ns, rows.values)
+    columns = estimator.columns
+    value = table[:, columns["parameters"]]
+    if not np.isfinite(value).all():
+        good = int(np.argmin(np.isfinite(value).all(axis=1)))
+        done = _columns(estimator, rows.first(good), table[:good], before) if good else None
+        number, time_ns = rows.number + good, int(rows.time_ns[good])
+        raise FilterFailure(estimator.description.method, number, time_ns, NOT_FINITE, done)
+    return state, _columns(estimator, rows, table, before)
+
+
+def _columns(estimator: CompiledEstimator, rows: Rows, table: np.ndarray, before: np.ndarray | None) -> Columns:
+    columns = estimator.columns
+    of = {name: table[:, columns[name]] for name in (*FIELDS, "std", "innovation_std")}
+    of["value"] = table[:, columns["parameters"]]
+    of["status"], of["state"] = of["status"].astype(np.uint8), of["state"].astype(np.uint8)
+    events = [
+        (k, event)
+        for k in _eventful(estimator, table, before)
+        for event in estimator.events(table[k], table[k - 1] if k else before, int(rows.time_ns[k]))
+    ]
+    return Columns(rows.number, rows.time_ns, of, events)
+
+
+def _eventful(estimator: CompiledEstimator, table: np.ndarray, before: np.ndarray | None) -> list[int]:
+    """Rows that may have something to tell: to ask each would take longer than the estimate."""
+    if before is None:
+        return list(range(len(table)))
+    columns = estimator.columns
+    told = np.isnan(table[:, columns["measured"]]).any(axis=1) | (table[:, columns["rewinds"]][:, 0] > 0.0)
+    for place in (columns["state"], columns["status"]):
+        now = table[:, place]
+        told[0] |= (now[0] != before[place]).any()
+        if len(table) > 1:
+            told[1:] |= (now[1:] != now[:-1]).any(axis=1)
+    return np.flatnonzero(told).tolist()

@@ -1,0 +1,124 @@
+"""Estimators follow a real replay back, ahead and round; who joins late, or comes back from the dead, misses nothing."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from crash_msgs.msg import ReplayState
+from crash_msgs.srv import Burst, Seek, Step
+from helpers_estimator_node import Stage, joined
+from numpy.testing import assert_array_equal
+
+from crash_estimator.core.fold import run
+from crash_estimator.core.methods import make_estimator
+from crash_estimator.model_file import load_model
+from crash_replay.bag import read_bag
+from crash_replay.qos import LATCHED
+from crash_replay.ros_messages import stamp_ns
+
+BAG = Path(__file__).resolve().parent.parent / "bags" / "frontal_engine_cab.mcap"
+MODEL = "frontal_engine_cab"
+METHODS = ("mrls", "gauss_newton")  # one compiled, one not
+
+
+@pytest.fixture
+def stage():
+    stage = Stage()
+    yield stage
+    stage.close()
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return read_bag(BAG)
+
+
+@pytest.fixture(scope="module")
+def whole(recording):
+    """Method -> parameters after every sample, as the one loop gives them."""
+    model = load_model(MODEL)
+    estimators = {method: make_estimator(model, recording.test, method) for method in METHODS}
+    return {name: np.array([e.parameters for e in run(one, recording.samples())]) for name, one in estimators.items()}
+
+
+def numbers(messages) -> list[int]:
+    return [message.number + k for message in messages for k in range(len(message.time_ns))]
+
+
+def assert_exact(messages, whole) -> None:
+    p = whole.shape[1]
+    assert_array_equal(joined(messages, "value")[:, :p], whole[numbers(messages)])
+
+
+def test_back_ahead_round_and_late(stage, recording, whole):
+    """One replay, paused and told what to do; at every sample the parameters are those of the whole loop."""
+    n = len(recording)
+    for method in METHODS:
+        stage.add_estimator(method, model=MODEL, method=method)
+    stage.replay(BAG, wait_for=2, start_paused=True, keep_alive=True)
+    expected = []
+
+    def burst(start, count):
+        assert stage.call(Burst, "replay/burst", n=count).sent == count
+        expected.extend(range(start, start + count))
+
+    def seek(number):
+        time = float(recording.time_ns[number]) * 1e-9
+        assert stage.call(Seek, "replay/seek", time=time).number == number
+
+    burst(0, 100)
+    assert stage.call(Step, "replay/step", n=-70).number == 30  # back
+    burst(30, 40)
+    seek(n - 150)  # ahead, over samples that were never sent
+    burst(n - 150, 50)
+    seek(0)  # round
+    burst(0, 20)
+    seek(90)  # ahead, over samples that were
+    burst(90, 30)
+    for method in METHODS:
+        heard = stage.wait_for(method, len(expected))
+        assert numbers(heard["parameters"]) == expected
+        assert_exact(heard["parameters"], whole[method])
+        lost = [event for event in heard["events"] if event.kind == "lost"]
+        text = f"{n - 250} samples before number {n - 150} were not seen: the replay has sent them again"
+        assert [(event.number, event.value, event.text) for event in lost] == [(n - 150, n - 250, text)]
+        state = heard["state"][-1]
+        assert (state.number, state.run, state.holds_from, state.missed) == (90, 4, 0, 0)
+        assert state.asked_again == n - 250
+        assert stamp_ns(state.header.stamp) == stamp_ns(heard["parameters"][-30].header.stamp)
+
+    stage.add_estimator("late", model=MODEL, method="mrls")
+    states = []
+    stage.node.create_subscription(ReplayState, "replay_state", states.append, LATCHED)
+    stage.spin_until(lambda: states and states[-1].subscribers == 3, "the replay has found it")
+    burst(120, 30)
+    late = stage.wait_for("late", 30)
+    assert numbers(late["parameters"]) == list(range(120, 150))
+    assert_exact(late["parameters"], whole["mrls"])
+    lost = [event.text for event in late["events"] if event.kind == "lost"]
+    assert lost == ["120 samples before number 120 were not seen: the replay has sent them again"]
+    assert [(s.number, s.holds_from, s.asked_again) for s in late["state"]] == [(120, 0, 120)]
+
+
+def test_killed_and_started_again_it_goes_on_as_if_nothing_had_been(stage, recording, whole):
+    stage.add_estimator("witness", model=MODEL, method="mrls")
+    victim = stage.listen("victim")
+    process = stage.start("crash_estimator.nodes.estimator_node", "victim", model=MODEL, method="mrls")
+    stage.replay(BAG, wait_for=2, wait_timeout=100.0, rate=0.015)
+    stage.spin_until(lambda: len(victim["parameters"]) > 100, "the victim has begun", 100.0)
+    process.kill()
+    process.wait()
+    before = len(victim["parameters"])
+    stage.start("crash_estimator.nodes.estimator_node", "victim", model=MODEL, method="mrls")
+    stage.spin_until(lambda: len(victim["parameters"]) > before + 50, "the victim is back", 100.0)
+    witness = stage.wait_for("witness", len(recording), patience=60.0)
+    assert numbers(witness["parameters"]) == list(range(len(recording)))
+    assert not [event for event in witness["events"] if event.kind == "lost"]
+    assert_exact(witness["parameters"], whole["mrls"])
+    again = victim["parameters"][before:]
+    first = again[0].number
+    assert numbers(again) == list(range(first, len(recording))) and first > victim["parameters"][before - 1].number
+    assert_exact(victim["parameters"], whole["mrls"])
+    state = victim["state"][-1]  # latched: known to those who have found the new one late
+    assert before <= state.number <= first and state.asked_again == state.number
+    assert (state.holds_from, state.missed) == (0, 0)
