@@ -1,10 +1,10 @@
-.PHONY: help demo test bags thesis benchmark-effects clean
+.PHONY: help demo test bags thesis benchmark benchmark-effects clean
 
 help: # what there is to make
 	@sed -n 's/^\([a-z-]*\):.*# /make \1	/p' Makefile
 
-demo: # a crash replayed, estimated and shown in Rerun; of your own with RECORDING=path
-	@tools/run crash_estimator demo $(if $(RECORDING),--recording "$(RECORDING)")
+demo: # a crash replayed, what its model lacks named, added and shown in Rerun; of your own with RECORDING=path WITH=path
+	@tools/run crash_estimator demo $(if $(RECORDING),--recording "$(RECORDING)") $(if $(WITH),--with "$(WITH)")
 
 # Without autoload: the plugins of an installed ROS 2 are written for an older pytest.
 test: # all tests; some of them with PYTEST_ARGS="-k name"
@@ -17,6 +17,11 @@ bags: # the simulated recordings in bags/, made anew
 
 thesis: # the thesis's simulated experiments run again: docs/thesis.md
 	@tools/env python -m crash_estimator.thesis
+
+benchmark: # every promised speed beside its reference, 6 minutes: docs/benchmark.md; ARGS="--quick"
+	@tools/setup
+	@.venv/bin/pip install -q --no-deps --no-build-isolation -r tools/benchmark-requirements.txt || true
+	@tools/env python -m crash_estimator.benchmarks.speed $(ARGS)
 
 benchmark-effects: # which hidden effects are found, on 1500 simulated tests: docs/missing-effects.md; ARGS="--cases 20"
 	@tools/env python -m crash_estimator.benchmarks.effects $(ARGS)

@@ -34,6 +34,12 @@ class Demo:
             )
         self.children: set[int] = set()
 
+    @property
+    def folder(self) -> Path:
+        """Where the only recording shown is written."""
+        (folder,) = self.out.iterdir()
+        return folder
+
     def said(self) -> str:
         return self.text.read_text()
 
@@ -115,12 +121,13 @@ def rows(rrd: Path) -> Counter:
 
 
 def view_origins(rrd: Path) -> set[str]:
-    """Where the data of each view in the layout come from."""
+    """Where the data of each view come from, in any of the layouts that followed each other."""
     from rerun.chunk import RrdReader
 
     reader = RrdReader(str(rrd))
     origins = set()
-    for chunk in reader.stream(store=reader.blueprints()[-1]):
+    chunks = (chunk for blueprint in reader.blueprints() for chunk in reader.stream(store=blueprint))
+    for chunk in chunks:
         batch = chunk.to_record_batch()
         if "ViewBlueprint:space_origin" in batch.schema.names:
             cells = batch.column("ViewBlueprint:space_origin").to_pylist()

@@ -28,6 +28,8 @@ class Crash(NamedTuple):
     crush: np.ndarray  # (n, 3)
     force: np.ndarray  # (n, 3)
     velocity: np.ndarray  # (n, 3) cab, engine, barrier
+    rate: np.ndarray  # (n, 3)
+    displacement: np.ndarray  # (n, 3)
     truth: np.ndarray  # (n, 3) cab and engine acceleration, barrier force
     measured: np.ndarray  # (n, 3) with noise
 
@@ -52,7 +54,9 @@ def simulate(n: int = 1500, pre: int = 100, seed: int = 0) -> Crash:
     crush, force, states = (np.array(column) for column in zip(*rows))
     truth = np.column_stack([_accelerations(force), force[:, 0] + force[:, 1]])
     measured = truth + NOISE * np.random.default_rng(seed).standard_normal(truth.shape)
-    return Crash(time_ns, crush, force, np.column_stack([states[:, 2:], np.zeros(n)]), truth, measured)
+    displacement, velocity = (np.column_stack([half, np.zeros(n)]) for half in (states[:, :2], states[:, 2:]))
+    rate = np.column_stack([velocity[:, 0], velocity[:, 1], velocity[:, 0] - velocity[:, 1]])
+    return Crash(time_ns, crush, force, velocity, rate, displacement, truth, measured)
 
 
 def _forces(state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -116,6 +120,8 @@ def estimates(
                 state[rows],
                 crash.velocity[rows],
                 acceleration[rows],
+                crash.rate[rows],
+                crash.displacement[rows],
             )
         )
     return blocks

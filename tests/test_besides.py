@@ -15,6 +15,7 @@ from crash_estimator.core.estimate import ParameterStatus
 from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.core.structure import Coefficient
+from crash_estimator.following.columns import columns_of
 from crash_estimator.nodes.estimate_messages import EstimateMessages, description_from, estimates_from
 from crash_estimator.tables import besides_table
 
@@ -37,7 +38,7 @@ def found(request):
 
 def messages(description, estimates):
     make = EstimateMessages(description)
-    return tuple(kind(Time(), 0, estimates) for kind in (make.parameters, make.residuals, make.forces))
+    return tuple(kind(Time(), 0, columns_of(estimates)) for kind in (make.parameters, make.residuals, make.forces))
 
 
 def test_it_travels_after_the_parameters_with_name_unit_and_sigma(found):

@@ -9,8 +9,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from crash_estimator.core.structure import ModelError
-from crash_estimator.demo.choice import Choice, as_bag, choose, default_rate
+from crash_estimator.demo.choice import Choice, as_bag, choose, default_rate, model_beside, simplest_model
 from crash_estimator.demo.domain import DOMAINS, free_domain, own_environment
+from crash_estimator.demo.folder import claim
 from crash_estimator.demo.terminal import Terminal, bar
 from crash_estimator.model_file import ready_models
 from crash_replay.bag import read_bag
@@ -31,7 +32,7 @@ def test_the_bundled_recording_is_missed_with_a_line(tmp_path, monkeypatch, caps
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(choice, "__file__", str(tmp_path / "somewhere/choice.py"))
     with pytest.raises(
-        RecordingError, match=r"bags/frontal_engine_cab\.mcap is not in .* start in the project's folder"
+        RecordingError, match=r"bags/hidden_effect\.mcap is not in .* start in the project's folder"
     ):
         choice.bundled_recording()
 
@@ -55,7 +56,16 @@ class TestChoice:
         assert all(found.values())
         assert found["side_dummy_padded"][0] == "side_dummy"
         assert found["side_mdb_door_car"][0] == "side_mdb_door_car"
-        assert found["impactor_single"] == ["impactor_single"] * 2
+        assert found["impactor_single"] == ["impactor_single", "impactor_spring"]
+
+    def test_a_search_begins_with_the_recordings_own_model_or_the_simplest(self, recording):
+        assert simplest_model(recording.test) == "frontal_single"
+        assert simplest_model(read_bag(BAG.with_name("impactor_single.mcap")).test) == "impactor_spring"
+        assert model_beside(BAG) is None
+        own = model_beside(BAG.with_name("hidden_effect.mcap"))
+        assert own == str(BAG.with_name("hidden_effect.model.yaml"))
+        hidden = read_bag(BAG.with_name("hidden_effect.mcap")).test
+        assert [c.name for c in choose(hidden, [own], ["rls"])] == ["hidden_effect"]
 
     def test_no_model_fits(self, recording):
         channels = (
@@ -78,6 +88,16 @@ class TestChoice:
         assert [c.name for c in choose(recording.test, [str(own)], ["rls"])] == ["model_1_my_car"]
         with pytest.raises(ModelError, match="two models are called model_1_my_car"):
             choose(recording.test, [str(own), str(twin)], ["rls"])
+
+
+def test_demonstrations_of_one_recording_side_by_side_have_folders_of_their_own(tmp_path):
+    with claim(tmp_path, BAG) as first, claim(tmp_path, BAG) as second, claim(tmp_path, tmp_path) as other:
+        names = [folder.name for folder in (first, second, other)]
+        assert names == ["frontal_engine_cab", "frontal_engine_cab-2", tmp_path.name]
+        (first / "demo.rrd").touch()
+    with claim(tmp_path, BAG) as again:
+        assert again == first, "free again, with what the other has left"
+    assert not second.exists() and first.exists(), "an empty one is not left behind"
 
 
 class TestSource:

@@ -119,17 +119,24 @@ def test_the_replay_waits_for_all_that_are_started(launched):
     assert without["replay"].wait_for == 1 and without["estimator"].method == "mrls"
 
 
+def test_the_diagnosis_is_started_where_it_is_asked_for_and_the_replay_waits_for_it_too(launched):
+    nodes = launched(bag="b", model="m", diagnosis="true")
+    assert nodes["diagnosis"].package == "crash_estimator" and nodes["diagnosis"].model == "m"
+    assert nodes["replay"].wait_for == 3
+    assert "diagnosis" not in launched(bag="b", model="m")
+
+
 def test_the_parameters_are_those_of_the_nodes(launched):
-    nodes = launched(bag="b", model="m")
+    nodes = launched(bag="b", model="m", diagnosis="true")
     assert set(vars(nodes["replay"])) - {"package"} <= set(PARAMETERS)
-    for name in ("estimator", "viewer"):
+    for name in ("estimator", "diagnosis", "viewer"):
         source = (PACKAGES / f"crash_estimator/crash_estimator/nodes/{name}_node.py").read_text()
         for parameter in set(vars(nodes[name])) - {"package"}:
             assert f'_declared("{parameter}"' in source
 
 
 def test_the_executables_and_the_launch_file_are_installed(launched):
-    nodes = launched(bag="b", model="m")
+    nodes = launched(bag="b", model="m", diagnosis="true")
     for name, node in nodes.items():
         assert f'"{name} = {node.package}.' in (PACKAGES / node.package / "setup.py").read_text()
     assert 'glob("launch/*.launch.py")' in (PACKAGES / "crash_estimator/setup.py").read_text()

@@ -1,5 +1,6 @@
 """Every command in the README is run here as it stands; `make test` is the one that runs this."""
 
+import json
 import os
 import re
 import shlex
@@ -13,7 +14,8 @@ README = (ROOT / "README.md").read_text()
 COMMANDS = [line for block in re.findall(r"```sh\n(.*?)```", README, re.S) for line in block.splitlines() if line]
 LISTENING = [c for c in COMMANDS if "crash_estimator viewer" in c or "crash_estimator estimator" in c]
 REPLAY = [c for c in COMMANDS if "crash_replay replay" in c]
-ALONE = [c for c in COMMANDS if c not in ("make test", *LISTENING, *REPLAY)]
+THREE = [c for c in COMMANDS if "hidden_effect" in c and "--effects" not in c]
+ALONE = [c for c in COMMANDS if c not in ("make test", *LISTENING, *REPLAY, *THREE)]
 
 
 def environment(domain: int) -> dict[str, str]:
@@ -36,10 +38,10 @@ def test_the_first_two_commands_do_everything():
 @pytest.mark.parametrize("command", ALONE)
 def test_a_command_runs_as_it_stands(command):
     needs_data(command)
+    if "out/camry.mcap --model" in command and not (ROOT / "out/camry.mcap").exists():  # by the command before it
+        subprocess.run(shlex.split(ALONE[ALONE.index(command) - 1]), cwd=ROOT, check=True, capture_output=True)
     if "synthesize" in command:  # does not replace what is there
         (ROOT / "out" / "mine.mcap").unlink(missing_ok=True)
-    if "out/camry.mcap --model" in command:  # goes on with what the import before it has written
-        subprocess.run(shlex.split(ALONE[ALONE.index(command) - 1]), cwd=ROOT, check=True, capture_output=True)
     done = subprocess.run(
         shlex.split(command), cwd=ROOT, env=environment(71), capture_output=True, text=True, timeout=240
     )
@@ -80,3 +82,34 @@ def test_the_three_nodes_find_each_other(tmp_path):
 @pytest.mark.parametrize("name", sorted(set(re.findall(r"`(ros2_ws/src/[\w/]+|bags/[\w.]+)`", README))))
 def test_every_path_that_is_named_is_there(name):
     assert (ROOT / name).exists()
+
+
+def test_the_effect_that_is_shown_is_the_file_and_stands_in_the_ranking():
+    (shown,) = re.findall(r"```python\n(.*?)```", README, re.S)
+    assert shown == (ROOT / "docs/position_damping.py").read_text() and shown.count("\n") <= 20
+    (command,) = [c for c in COMMANDS if "--effects" in c]
+    found = ROOT / "out/own.json"
+    if not found.exists():  # made by the command's own test, above
+        subprocess.run(shlex.split(command), cwd=ROOT, check=True, capture_output=True, env=environment(71))
+    ranking = json.loads(found.read_text())["ranking"]
+    names = {(one["effect"], one["target"]): one for one in ranking}
+    assert ("position_damping", "rib_spine") in names, "offered on the elements of the model"
+    assert (ranking[0]["effect"], ranking[0]["target"]) == ("coulomb_friction", "rib_spine")
+
+
+def test_three_commands_lead_from_a_bag_to_a_lower_error():
+    """What the commands of the section print: the same errors, then what is missing, then smaller ones."""
+    assert [c.split()[2] for c in THREE] == ["estimate", "diagnose", "estimate"]
+    said = [
+        subprocess.run(shlex.split(c), cwd=ROOT, check=True, capture_output=True, text=True, env=environment(71)).stdout
+        for c in THREE
+    ]
+    assert said[1].startswith("effect missing: coulomb_friction on rib_spine")
+    before, after = (_spread(text) for text in (said[0], said[2]))
+    assert all(after[body] < 0.8 * before[body] for body in ("rib", "spine"))
+
+
+def _spread(text: str) -> dict[str, float]:
+    """Standard deviation of each equation's error, in g."""
+    rows = re.findall(r"^(\w+) +g +\S+ +\S+ +\S+ +(\S+) +\S+%$", text, re.M)
+    return {name: float(value) for name, value in rows}

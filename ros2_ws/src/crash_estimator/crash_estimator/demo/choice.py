@@ -87,7 +87,8 @@ def choose(
 
 def _node_name(model: str, method: str, several_models: bool, several_methods: bool) -> str:
     """What tells the estimators apart, as a ROS name: letters, digits and underscores."""
-    parts = [Path(model).stem.removesuffix(".model")] * (several_models or not several_methods) + [method] * several_methods
+    stem = Path(model).stem.removesuffix(".model")
+    parts = [stem] * (several_models or not several_methods) + [method] * several_methods
     name = re.sub(r"\W+", "_", "_".join(parts), flags=re.ASCII)
     return name if name[0].isalpha() else f"model_{name}"
 

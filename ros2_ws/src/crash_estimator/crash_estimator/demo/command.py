@@ -18,7 +18,16 @@ from ..cli.common import guarded
 from ..core.methods import METHODS
 from ..model_file import ready_models
 from .children import Children
-from .choice import METHOD_OF_SEVERAL_MODELS, Choice, as_bag, bundled_recording, choose, default_rate, model_beside, simplest_model
+from .choice import (
+    METHOD_OF_SEVERAL_MODELS,
+    Choice,
+    as_bag,
+    bundled_recording,
+    choose,
+    default_rate,
+    model_beside,
+    simplest_model,
+)
 from .domain import own_environment
 from .folder import claim
 from .terminal import Terminal, near
@@ -42,7 +51,7 @@ def _interrupt(*_) -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="demo",
-        description="Replay a recording, estimate on it, name what the model lacks, add it and show how the error falls.",
+        description="Replay a recording, estimate on it, name what the model lacks, add it, show how the error falls.",
     )
     parser.add_argument(
         "--recording", type=Path, metavar="PATH",
@@ -57,8 +66,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--cfc", type=int, choices=(0, *CFC_CLASSES),
-        help="filter what is imported with this class of SAE J211-1, 0: not (default: not, or 60 for a laboratory's folder"
-        " with --no-diagnosis)",
+        help="filter what is imported with this class of SAE J211-1, 0: not (default: not,"
+        " or 60 for a laboratory's folder with --no-diagnosis)",
     )  # fmt: skip
     parser.add_argument(
         "--with", dest="others", type=Path, action="append", default=[], metavar="PATH",
@@ -124,7 +133,8 @@ def _announcement(
 
 
 def _start(
-    children: Children, bag: Path, others: Sequence[Path], choices: Sequence[Choice], rate: float, rrd: Path | None, searches: bool
+    children: Children, bag: Path, others: Sequence[Path], choices: Sequence[Choice], rate: float, rrd: Path | None,
+    searches: bool,
 ) -> None:  # fmt: skip
     """All at once; the one that takes longest to start first."""
     names = [choice.name for choice in choices]

@@ -1,4 +1,4 @@
-"""A folder of its own for each demonstration, so that two that run side by side do not write into each other's files."""
+"""A folder of its own for each demonstration, so that two side by side do not write into each other's files."""
 
 import fcntl
 import os

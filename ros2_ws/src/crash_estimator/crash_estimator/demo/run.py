@@ -34,7 +34,7 @@ ANSWERING = 240.0
 """s that the diagnosis has for its answer after the last sample, and again with what it has added."""
 MISSING = ("Missing effect", "which effect the model lacks, and its error, fit by fit; shaded where the model fails")
 LOOK_AT = (
-    ("Overview", "measured and predicted acceleration; beside it, the residual leaves its 99 % band where a model fails"),
+    ("Overview", "measured and predicted acceleration; the residual leaves its 99 % band where a model fails"),
     ("Force over crush", "the loop of each element: its slope is the stiffness, what it encloses the absorbed energy"),
     ("Parameters", "stiffness with its sigma; in the lanes below, when each element loads, unloads or is apart"),
     ("Motion and states", "bodies and springs move with the time cursor: drag it through the crash"),
@@ -113,7 +113,8 @@ class Run:
                 self.terminal.say(f"the diagnosis has not answered within {ANSWERING:g} s")
                 return
             self._listen(watch, executor)
-            self.terminal.wait("comparing every candidate on all samples" if not answers else "judging the model with it", waited)
+            doing = "judging the model with it" if answers else "comparing every candidate on all samples"
+            self.terminal.wait(doing, waited)
         self.terminal.clear()
         for _ in range(3):  # its last curves, and what the estimators say to it
             self._listen(watch, executor)
@@ -132,11 +133,12 @@ class Run:
         return now - self.ended_at > SILENCE
 
     def _tell_of_processes(self) -> None:
-        """Warnings of all, what the viewer says of itself, and who has died."""
+        """Warnings of all, what the viewer says of itself, what is added to a model, and who has died."""
         for name, child in self.children.items():
             for level, text in child.messages():
-                if level in ("WARN", "ERROR", "FATAL") or name == "viewer":
-                    self.terminal.say(f"{name}: {text}")
+                changed = name in self.choices and text.startswith("revision ")  # an effect has been added to its model
+                if level in ("WARN", "ERROR", "FATAL") or name == "viewer" or changed:
+                    self.terminal.say(f"{'added to ' * changed}{name}: {text}")
                 self.gave_up |= name == "diagnosis" and level in ("ERROR", "FATAL")
             status = child.status
             stays = name in self.choices or name == "diagnosis"

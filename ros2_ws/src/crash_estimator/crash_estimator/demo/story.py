@@ -21,7 +21,7 @@ class Story:
     def __init__(self) -> None:
         self.leader, self.led, self.signs = "", 0, 0
         self.finals: dict[int, RankingBlock] = {}  # by revision
-        self.windows: tuple[Window, ...] = ()
+        self.lacks: list[str] | None = None  # told after where it fails; None: not known yet, or told
 
     @property
     def complete(self) -> bool:
@@ -29,14 +29,13 @@ class Story:
         return bool(self.finals) and (not self.finals[min(self.finals)].found or len(self.finals) > 1)
 
     def misfit(self, block: MisfitBlock) -> list[str]:
-        """Where the model as it was given fails: told with the first answer on all samples."""
-        first = len(self.finals) == 1 and not self.windows
-        if not first:
+        """Where the model as it was given fails, and what it lacks: told with the first answer on all samples."""
+        if self.lacks is None:
             return []
-        self.windows = block.windows
+        lacks, self.lacks = self.lacks, None
         worst = sorted(block.windows, key=lambda w: -w.rms * (w.end - w.start) ** 0.5)[:WINDOWS]
         lines = [_where(window) for window in sorted(worst, key=lambda w: w.start)]
-        return [f"where it fails: {'; '.join(lines)}"] if lines else []
+        return [f"where it fails: {'; '.join(lines)}"] * bool(lines) + lacks
 
     def ranking(self, block: RankingBlock) -> list[str]:
         if not block.final:
@@ -44,7 +43,11 @@ class Story:
         if block.revision in self.finals:
             return []
         self.finals[block.revision] = block
-        return _answer(block) if len(self.finals) == 1 else self._after(block)
+        if len(self.finals) > 1:
+            return self._after(block)
+        self.lacks = _lacks(block)
+        errors = f"error {G.factor * block.rms_before:.3g} {G.unit}, noise floor {G.factor * block.noise_floor:.3g}"
+        return [f"all samples: {block.verdict.replace('_', ' ')}; {errors}"]
 
     def _sign(self, block: RankingBlock) -> list[str]:
         best = block.ranking[0] if block.ranking and block.verdict == "effect_missing" else None
@@ -66,14 +69,13 @@ def _where(window: Window) -> str:
     return f"{window.body}, {window.state}, {moment}: RMS {G.factor * window.rms:.3g} {G.unit}"
 
 
-def _answer(block: RankingBlock) -> list[str]:
-    errors = f"error {G.factor * block.rms_before:.3g} {G.unit}, noise floor {G.factor * block.noise_floor:.3g}"
-    lines = [f"all samples: {block.verdict.replace('_', ' ')}; {errors}"]
-    counting = [one for one in block.ranking if one.evidence >= FOUND]
-    if counting:
-        lines.append(f"what it lacks: {_named(counting[0])}")
-        lines += [f"not told from it here: {_listed(counting[0].confounded_with)}"] * bool(counting[0].confounded_with)
-    return lines
+def _lacks(block: RankingBlock) -> list[str]:
+    """The best candidate where it counts, and its rivals."""
+    best = block.ranking[0] if block.ranking else None
+    if best is None or best.evidence < FOUND:
+        return []
+    rivals = f"not told from it here: {_listed(best.confounded_with)}"
+    return [f"what it lacks: {_named(best)}"] + [rivals] * bool(best.confounded_with)
 
 
 def _named(one: Candidate) -> str:
@@ -87,7 +89,8 @@ def _fall(before: RankingBlock, after: RankingBlock) -> str:
         for a, b in ((before.rms_before, after.rms_before), (before.free_run_before, after.free_run_before))
     )
     left = "white" if after.white_before else "not white"
-    return f"the error falls: {fit} (simulated freely {run}), noise floor {G.factor * after.noise_floor:.3g}; what is left is {left}"
+    floor = f"noise floor {G.factor * after.noise_floor:.3g}"
+    return f"the error falls: {fit} (simulated freely {run}), {floor}; what is left is {left}"
 
 
 def _rest(block: RankingBlock) -> str:

@@ -65,6 +65,8 @@ def judge(structure: Structure, blocks: list[Block]) -> Judged | None:
     description = describe(parameters, residuals, forces)
     estimates = estimates_of(parameters, residuals, forces)
     judged = validate(structure, description, estimates)
+    if not all(f"{element}.damping" in description.parameters for element in description.elements):
+        return Judged(judged, None, [])  # a method that finds masses, say, gives no forces
     try:
         simulated = free_run(structure, description, estimates)
     except (ModelError, np.linalg.LinAlgError, FloatingPointError):

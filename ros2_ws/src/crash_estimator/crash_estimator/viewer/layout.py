@@ -90,8 +90,9 @@ def tabs(cast: Cast) -> list[rrb.Container]:
 
 def blueprint(cast: Cast, active_tab: int = 0) -> rrb.Blueprint:
     """All tabs, the first one on top; the time cursor follows the newest sample."""
+    shown = tabs(cast)
     return rrb.Blueprint(
-        rrb.Tabs(*tabs(cast), active_tab=active_tab),
+        rrb.Tabs(*shown, active_tab=active_tab if shown else None),  # none yet: a diagnosis came first
         rrb.TimePanel(timeline=TIMELINE, play_state="following", state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),

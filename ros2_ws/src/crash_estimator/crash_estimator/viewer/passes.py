@@ -156,7 +156,7 @@ class Pass:
         return member(heads[ParameterBlock], heads[ResidualBlock], heads[ForceBlock])
 
     def _begin(self, present: Sequence[str]) -> tuple[int, float] | None:
-        """(number, s) of any sample: of an estimator's, or of one that the diagnosis speaks of; None where there is none."""
+        """(number, s) of any sample: an estimator's, or one that the diagnosis speaks of; None where there is none."""
         if present:
             block = self._heads[present[0]][ResidualBlock]
             return block.number, float(block.time_ns[0]) * 1e-9

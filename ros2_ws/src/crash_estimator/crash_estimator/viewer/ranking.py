@@ -96,7 +96,7 @@ def error_drawing(steps: Sequence[Step], floor: float, shown: Shown) -> Drawing:
         for k, step in enumerate(steps)
     ]  # fmt: skip
     shown_bars = bars[:1] + bars[1:][1 - REVISIONS :]  # the first and the newest
-    title = f"RMS residual, {shown.unit}; noise floor {shown.factor * floor:.3g}"
+    title = f"RMS residual of this test, {shown.unit}; noise floor {shown.factor * floor:.3g}"
     drawing = bar_chart(shown_bars, title, rows=REVISIONS, line=shown.factor * floor)
     keys = [("measured", MEASURED), *((f"fails {state}", color) for state, color in zip(STATES, STATE_COLORS))]
     for at, (key, color) in zip((0.1, 0.34, 0.62, 0.88), keys):

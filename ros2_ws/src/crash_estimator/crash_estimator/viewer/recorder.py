@@ -167,7 +167,8 @@ class Recorder:
         """One complete pass in a file is enough: a test that is replayed in a loop must not fill the disk."""
         have_one = any(pass_.path and pass_.complete for pass_ in self._passes.values())
         file = None if have_one else self.sinks.open_file()
-        return Pass(self.sinks.open_live(), file, self.expected, not self._passes, self._guarded, Jury(self.structure_of))
+        live, jury = self.sinks.open_live(), Jury(self.structure_of)
+        return Pass(live, file, self.expected, not self._passes, self._guarded, jury)
 
     def _guarded(self, action: Callable):
         """A block that cannot be drawn is said once and left out; the rest goes on."""

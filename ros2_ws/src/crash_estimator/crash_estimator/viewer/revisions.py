@@ -39,7 +39,9 @@ class Revisions:
         self.whole: dict[str, RevisionBlock] = {}  # by model, in order
         self.ranking: RankingBlock | None = None  # the newest
         self.misfit: MisfitBlock | None = None  # the newest
+        self.mass = 0.0  # kg, of the model as it was given: an added effect may take some of it
         self.shaded_until = 0.0  # s
+        self.shaded_to: dict[str, float] = {}  # s, by entity: where its shade goes on
         self.shaded_all = False
 
     def write_ranking(self, cast: Cast, block: RankingBlock) -> None:
@@ -79,7 +81,8 @@ class Revisions:
         if ranking is None:
             return
         if self.whole:
-            steps = [Step(block.label, _rms(block, cast.mass), False) for block in self.whole.values()]
+            self.mass = self.mass or cast.mass
+            steps = [Step(block.label, _rms(block, self.mass), False) for block in self.whole.values()]
             if ranking.final and ranking.revision == 0:
                 steps[0] = steps[0]._replace(white=ranking.white_before)
             if ranking.final:
@@ -116,14 +119,15 @@ class Revisions:
                         self._shade(path(kind, body, part, f"misfit_{state}"), own, f"fails while {state}", color)
 
     def _shade(self, entity: str, stretches: list[Stretch], name: str, color: Color) -> None:
-        """A wide band between two instants, and gaps between the stretches."""
-        times, heights = [], []
+        """A wide band over each stretch, a gap before it unless it goes on from the one before."""
+        rows = []
         for start, end in stretches:
-            times += [start, end, end + 1e-9]
-            heights += [SHADE, SHADE, np.nan]
-        time_ns = np.round(np.array(times) * 1e9).astype(np.int64)
-        half = np.array(heights)
-        self.pen.band(entity, time_ns, np.where(np.isnan(half), np.nan, 0.0), half, name, color, 0.1)
+            rows += [(start - 1e-9, np.nan)] if start > self.shaded_to.get(entity, -np.inf) else []
+            rows += [(start, 0.0), (end, 0.0)]
+            self.shaded_to[entity] = end
+        time_ns, center = np.array(rows).T
+        time_ns = np.round(time_ns * 1e9).astype(np.int64)
+        self.pen.band(entity, time_ns, center, center + SHADE, name, color, 0.1)
 
 
 def _rms(block: RevisionBlock, mass: float) -> float:
@@ -150,7 +154,7 @@ def whiteness_drawing(blocks: list[RevisionBlock], k: int) -> Drawing:
             drawing.line(stem, revision_color(revision), 1.0)
         for limit in (-found.limit(0.95), found.limit(0.95)):
             drawing.line([frame.at(0.0, limit), frame.at(LAGS, limit)], FLOOR, 0.6)
-    drawing.text((0.55, 1.05), "over lag in samples; 95 % limits", FLOOR)
+    drawing.text((0.52, 1.05), "auto-correlation, lag in samples", FLOOR)
     return drawing
 
 
@@ -164,7 +168,7 @@ def revision_views(cast: Cast) -> list[rrb.View]:
         found += [
             _plot(path("revision", body), part, f"{body}: {quantity}, {shown}"),
             _plot(path("left", body), part, f"{body}: what is left, with the noise's 99 % band, {shown}"),
-            view(path("whiteness", body), f"{body}: auto-correlation", 1.0, 1.07, -0.14),
+            view(path("whiteness", body), f"{body}: whiteness", 1.0, 1.07, -0.14),
         ]
     return found
 

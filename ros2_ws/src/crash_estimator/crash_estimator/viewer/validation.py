@@ -143,7 +143,6 @@ def validation_tab(cast: Cast) -> rrb.Container:
         )
         for body, unit in bodies
     ]  # fmt: skip
-    return rrb.Horizontal(
-        rrb.Tabs(*tables), (rrb.Horizontal if least is rrb.Vertical else rrb.Tabs)(*correlations), rrb.Vertical(*free_runs), column_shares=[4, 4, 3],
-        name="Validation",
-    )  # fmt: skip
+    beside = rrb.Horizontal if least is rrb.Vertical else rrb.Tabs
+    parts = rrb.Tabs(*tables), beside(*correlations), rrb.Vertical(*free_runs)
+    return rrb.Horizontal(*parts, column_shares=[4, 4, 3], name="Validation")

@@ -1,0 +1,88 @@
+"""`effects`: judge the search for the missing effect on simulated recordings, and write docs/missing-effects.md."""
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+from time import monotonic
+
+from ..cli.common import guarded
+from ..figures import write_markdown
+from .effects_judge import WANTED, judge, kind_of
+from .effects_page import page
+from .effects_plan import FULL, SEEDS, TWO, Case, case_of, plan
+from .effects_results import ONE_THREAD, append, code, in_processes, judged, read
+from .effects_time import timed
+
+TIMED = ("coulomb_friction", "viscous_damping", "plastic_unloading", "added_mass", "load_path", "unmodelled_body",
+         "channel_delay", "channel_gain", "constant_force", "rate_hardening")  # fmt: skip
+"""Hidden in the dummy, one at a time, where the time is taken."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="effects", description=__doc__.partition(": ")[2])
+    parser.add_argument("--cases", type=int, metavar="N", help="only the first N of the plan, which is mixed; default all")
+    parser.add_argument("--case", metavar="NAME", help="only this one, with its row of results, and write nothing")
+    parser.add_argument("--like", metavar="TEXT", help="only cases with this in their names, such as dummy/clearance")
+    parser.add_argument("--seeds-from", type=int, default=SEEDS, metavar="N", help="below the default for development")
+    parser.add_argument("--results", type=Path, default=Path("out/missing-effects.jsonl"), help="resumed where it exists")
+    parser.add_argument("--to", type=Path, default=Path("docs/missing-effects.md"), metavar="PAGE.md")
+    parser.add_argument("--processes", type=int, default=os.cpu_count(), metavar="N")
+    parser.add_argument("--fresh", action="store_true", help="drop the results there are")
+    parser.add_argument("--page", action="store_true", help="judge nothing more, only write the page")
+    arguments = parser.parse_args()
+    os.environ.update(ONE_THREAD)
+    sys.exit(guarded(lambda: _one(arguments.case) if arguments.case else _run(arguments)))
+
+
+def _one(name: str) -> None:
+    print(json.dumps(judge(case_of(name)), indent=1))
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    if arguments.fresh:
+        arguments.results.unlink(missing_ok=True)
+    cases = [c for c in plan(arguments.seeds_from)[: arguments.cases] if (arguments.like or "") in c.name]
+    times = _timed_cases(arguments.seeds_from, 1 if arguments.cases else len(TIMED))
+    done = read(arguments.results)
+    if not arguments.page:
+        left = [c for c in cases if c.name not in done]
+        print(f"{len(cases)} cases, {len(cases) - len(left)} of them in {arguments.results}", flush=True)
+        _add(judged(left, arguments.processes), len(left), arguments.results, done)
+        clocked = [c for c in times if f"time {c.name}" not in done]
+        if clocked:  # one after the other, with nothing beside them
+            _add(in_processes(timed, clocked, 1), len(clocked), arguments.results, done)
+    rows = [done[c.name] for c in cases if c.name in done]
+    clocked = [done[f"time {c.name}"] for c in times if f"time {c.name}" in done]
+    arguments.to.parent.mkdir(parents=True, exist_ok=True)
+    write_markdown(arguments.to, [page(rows, clocked, len(cases), code())])
+    print(f"{arguments.to}: {len(rows)} of {len(cases)} cases")
+
+
+def _add(rows, count: int, results: Path, done: dict[str, dict]) -> None:
+    start = monotonic()
+    for n, row in enumerate(rows, 1):
+        append(results, row)
+        done[row["case"]] = row
+        ahead = (monotonic() - start) / n * (count - n) / 60.0
+        print(f"{n}/{count}, {ahead:.0f} min to go: {row['case']}: {_outcome(row)}", flush=True)
+
+
+def _outcome(row: dict) -> str:
+    if "time" in row:
+        return f"{row['time']['wall']:.2f} s"
+    if "not_drawn" in row:
+        return row["not_drawn"]
+    first = " on ".join(row["ranking"][0]["key"]) if row.get("ranking") else row.get("error", "")
+    good = WANTED[kind_of(case_of(row["case"]))](row)
+    return f"{row['verdict']}, {first}{'' if good else ' (not right)'}"
+
+
+def _timed_cases(first_seed: int, count: int) -> list[Case]:
+    seed = first_seed + len(plan(first_seed))
+    return [Case("dummy", (effect,), 1.0, 1.0, FULL, TWO, seed + n) for n, effect in enumerate(TIMED[:count])]
+
+
+if __name__ == "__main__":
+    main()

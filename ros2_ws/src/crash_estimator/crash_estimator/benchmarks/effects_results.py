@@ -1,0 +1,61 @@
+"""The file of results: one row of JSON for a case, appended as soon as it is judged, so that a run can be resumed."""
+
+import json
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache
+from hashlib import sha256
+from multiprocessing import get_context
+from pathlib import Path
+
+from crash_replay.synthetic import hidden
+
+from ..core import diagnosis, effects
+from . import effects_judge
+from .effects_judge import judge
+from .effects_plan import Case
+
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+"""For every process: threads on matrices as small as these cost more than they bring."""
+
+
+@cache
+def code() -> str:
+    """A fingerprint of the search, of the cases and of a row: rows made by other code are not counted."""
+    folders = [Path(package.__file__).parent for package in (diagnosis, effects, hidden)]
+    digest = sha256()
+    for path in (Path(effects_judge.__file__), *(path for folder in folders for path in sorted(folder.glob("*.py")))):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def read(path: Path) -> dict[str, dict]:
+    """Case -> row, of this code; a last row that was cut off is left out."""
+    rows = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+        try:
+            row = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        if row.get("code") == code():
+            rows[row["case"]] = row
+    return rows
+
+
+def append(path: Path, row: dict) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    cut_off = path.exists() and path.read_bytes()[-1:] not in (b"", b"\n")
+    with path.open("a", encoding="utf-8") as file:
+        file.write(("\n" if cut_off else "") + json.dumps(row) + "\n")
+
+
+def judged(cases: Iterable[Case], processes: int) -> Iterator[dict]:
+    """Rows in the order in which they are done; `ONE_THREAD` must be in the environment."""
+    yield from in_processes(judge, list(cases), processes)
+
+
+def in_processes(function: Callable[[Case], dict], cases: list[Case], processes: int) -> Iterator[dict]:
+    """Fresh processes: each reads its number of threads as it starts."""
+    mark = {"code": code()}
+    with get_context("spawn").Pool(processes) as pool:
+        for row in pool.imap_unordered(function, cases):
+            yield row | mark

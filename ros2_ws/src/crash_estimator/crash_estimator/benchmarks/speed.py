@@ -1,0 +1,76 @@
+"""`make benchmark`: every speed that the project promises beside its reference, measured in one run."""
+
+import argparse
+import os
+import platform
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from ..cli.common import guarded
+from ..demo.domain import own_environment
+from ..figures import markdown_table, write_markdown
+from ..tables import table
+from .speed_growth import growth
+from .speed_graph import start_ros
+from .speed_live import Effort, Live
+from .speed_row import HEAD, Row
+from .speed_steps import steps
+
+QUICK = Effort(singles=0.1, blocks=0.5, rounds=1, hold=1.0, probe=0.5, rates=(2e3,), latency=200, jitter=0.3)
+PARTS = ("steps", "growth", "throughput", "latency", "jitter", "viewer", "real_time")
+
+ABOUT = """\
+# Speed
+
+Made by `make benchmark` on {machine}, {cores} cores, load {load:.1f} before it began; {when}. Each row is measured beside its
+reference in the same run, in turns; a ratio holds on another machine, a time does not. A machine that does other work
+makes every row worse, those with several processes most.
+"""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="benchmark", description=__doc__.partition(": ")[2])
+    parser.add_argument("--to", default="docs", metavar="DIR", help="folder of benchmark.md")
+    parser.add_argument("--quick", action="store_true", help="see that it works; the figures say little")
+    parser.add_argument("--hold", type=float, default=Effort.hold, help="s that the highest rate must be held")
+    parser.add_argument("--only", nargs="*", choices=PARTS, default=PARTS, help="some of the rows; no page is written")
+    arguments = parser.parse_args()
+    sys.exit(guarded(lambda: benchmark(arguments)))
+
+
+def benchmark(arguments: argparse.Namespace) -> None:
+    load, rows, start = os.getloadavg()[0], [], time.monotonic()
+    effort = QUICK if arguments.quick else Effort(hold=arguments.hold)
+    with tempfile.TemporaryDirectory(prefix="benchmark.") as scratch:
+        for title, part in _parts(Path(scratch), effort, arguments):
+            print(f"{time.monotonic() - start:5.0f} s  {title}", file=sys.stderr, flush=True)
+            rows += part()
+    print(table(HEAD, [row.cells() for row in rows]))
+    if tuple(arguments.only) == PARTS:
+        about = ABOUT.format(machine=platform.machine(), cores=os.cpu_count(), load=load, when=time.strftime("%Y-%m-%d"))
+        page = [about, markdown_table(HEAD, [row.cells() for row in rows]), ""]
+        print(write_markdown(Path(arguments.to) / "benchmark.md", page))
+
+
+def _parts(folder: Path, effort: Effort, arguments) -> Iterator[tuple[str, Callable[[], list[Row]]]]:
+    if "steps" in arguments.only:
+        yield "steps", lambda: list(steps(folder))
+    if "growth" in arguments.only:
+        shorter = {"seconds": (0.1, 1.0), "parameters": (2, 6)} if arguments.quick else {}
+        yield "growth", lambda: list(growth(folder, **shorter))
+    live = [name for name in PARTS[2:] if name in arguments.only]
+    if not live:
+        return
+    environment = own_environment()
+    os.environ.update(environment)
+    start_ros(environment)
+    graph = Live(folder, environment, effort)
+    for name in live:
+        yield name, lambda name=name: list(getattr(graph, name)())
+
+
+if __name__ == "__main__":
+    main()

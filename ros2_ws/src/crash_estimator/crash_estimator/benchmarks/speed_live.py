@@ -1,0 +1,139 @@
+"""The rows that need the graph: throughput, real time, latency, jitter, and what the viewer costs."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from crash_replay.bag import write_bag
+
+from .speed_graph import Graph, Pass, jitter, latencies
+from .speed_recordings import chain, ringing
+from .speed_row import Row
+
+BODIES = 3
+"""Of the model: 3 equations, 6 parameters."""
+SIZES = {"parameters": 2 * BODIES, "residuals": BODIES, "forces": BODIES, "bodies": BODIES + 1}
+METHODS = ("mrls", "constrained_kalman")
+FLAT_OUT = 1000.0
+"""Times real time: the replay sends as fast as it is taken."""
+KEPT = 0.99
+"""Share of real time below which a rate is not held."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How long to measure."""
+
+    singles: float = 1.0  # s at 10 kHz, of a throughput in single messages
+    blocks: float = 10.0  # and in blocks
+    rounds: int = 2  # each against its reference in turn
+    hold: float = 60.0  # s that the highest rate must be held
+    probe: float = 4.0  # s that a rate is tried before
+    rates: tuple[float, ...] = (10e3, 20e3, 40e3)  # Hz
+    latency: int = 2000  # samples, at 1 kHz
+    jitter: float = 3.0  # s, at 1 kHz
+
+
+class Live:
+    """Bags, model and environment, made once."""
+
+    def __init__(self, folder: Path, environment: dict[str, str], effort: Effort):
+        self.folder, self.environment, self.effort = folder, environment, effort
+        self.model = chain(BODIES, folder / "chain.yaml")
+        self.runs = 0
+
+    def bag(self, channels: int, seconds: float, rate: float) -> Path:
+        return write_bag(ringing(channels, seconds, rate), self.folder / f"{channels}_{seconds:g}_{rate:g}.mcap", True)
+
+    def graph(self, names: tuple[str, ...]) -> Graph:
+        self.runs += 1
+        return Graph(self.folder / f"run{self.runs}", self.environment, names)
+
+    def throughput(self) -> Iterator[Row]:
+        effort = self.effort
+        for title, block, seconds in (("single messages", 1, effort.singles), ("blocks as the replay chooses", 0, effort.blocks)):
+            bag, ours, theirs = self.bag(4, seconds, 10e3), [], []
+            for _ in range(self.effort.rounds):
+                theirs.append(self._pass(bag, relay=True, block=block))
+                ours.append(self._pass(bag, relay=False, block=block))
+            best, reference = (max(run.per_second for run in runs) for runs in (ours, theirs))
+            lost = sum(run.lost for run in ours)
+            what = f"samples a second, replay to parameters and residuals, {title}"
+            said = f"{best:,.0f} /s, {lost} lost", f"bare relay {reference:,.0f} /s"
+            yield Row(what, *said, 0.0 if lost else best / reference, 0.8)
+
+    def _pass(self, bag: Path, relay: bool, block: int, viewer: bool = False) -> Pass:
+        with self.graph(("node",)) as graph:
+            if relay:
+                graph.relay("node", **SIZES)
+            else:
+                graph.estimator("node", self.model, "constrained_kalman")
+            if viewer:
+                graph.children.start(
+                    "viewer", "crash_estimator", "viewer", open=False, rrd=str(graph.children.logs / "seen.rrd")
+                )
+            graph.settle()
+            if viewer:
+                graph.spin_until(lambda: graph.listener.count_subscribers("/node/forces") > 0, "the viewer listens")
+            return graph.replay(bag, 1 + viewer, rate=FLAT_OUT, block=block)
+
+    def viewer(self) -> Iterator[Row]:
+        bag = self.bag(4, self.effort.blocks, 10e3)
+        off, on = [], []
+        for _ in range(self.effort.rounds):
+            off.append(self._pass(bag, relay=False, block=0).per_second)
+            on.append(self._pass(bag, relay=False, block=0, viewer=True).per_second)
+        cost = 1.0 - max(on) / max(off)
+        what = "the viewer's cost on the estimator's throughput"
+        yield Row(what, f"{max(on):,.0f} /s with it", f"{max(off):,.0f} /s without", cost, 0.05, least=False)
+
+    def real_time(self) -> Iterator[Row]:
+        """Rates are tried in turn; the highest that is kept is held for the whole time."""
+        recorded = 20e3
+        bag, highest, notes = self.bag(16, 0.5, recorded), 0.0, []
+        with self.graph(METHODS) as graph:
+            for method in METHODS:
+                graph.estimator(method, self.model, method)
+            graph.settle()
+            for rate in self.effort.rates:
+                run = graph.replay(bag, 2, self.effort.probe, rate=rate / recorded)
+                notes.append(f"{rate / 1e3:g} kHz: {run.rate / (rate / recorded):.3f} of it, {run.lost} lost")
+                if run.rate < KEPT * rate / recorded or run.lost:
+                    break
+                highest = rate
+            if highest:
+                run = graph.replay(bag, 2, self.effort.hold, rate=highest / recorded)
+                kept, block = run.rate / (highest / recorded), run.sent / run.messages
+                said = f"{highest / 1e3:g} kHz, {self.effort.hold:g} s: {kept:.3f} of it, {run.lost} lost, {block:.3g} a message"
+                if kept < KEPT or run.lost:
+                    highest = 0.0
+            else:
+                said = "none of those tried"
+        what = "highest real-time rate held, 16 channels, two estimators"
+        yield Row(what, said, "tried " + "; ".join(notes), highest / 20e3, 1.0)
+
+    def latency(self) -> Iterator[Row]:
+        recording, found = ringing(4, self.effort.latency / 1000.0, 1000.0), {"relay": [], "estimator": []}
+        for _ in range(self.effort.rounds):
+            for kind, all_of_it in found.items():
+                with self.graph(("node",)) as graph:
+                    if kind == "relay":
+                        graph.relay("node", **SIZES)
+                    else:
+                        graph.estimator("node", self.model, "constrained_kalman")
+                    graph.settle()
+                    delay = latencies(graph, recording, 1000.0, self.effort.latency)
+                    all_of_it.append(delay[len(delay) // 10 :])
+        for share, reach in ((50, None), (99, 1.5)):
+            ours, theirs = (min(np.percentile(delay, share) for delay in found[kind]) for kind in ("estimator", "relay"))
+            said = f"{ours * 1e3:.3f} ms", f"bare relay {theirs * 1e3:.3f} ms"
+            yield Row(f"latency sample to parameters at 1 kHz, p{share}", *said, ours / theirs, reach, least=False)
+
+    def jitter(self) -> Iterator[Row]:
+        bag = self.bag(4, self.effort.jitter, 1000.0)
+        off = jitter(self.folder / "jitter", self.environment, bag, 1e-3)
+        p50, p99 = (np.percentile(off, share) * 1e3 for share in (50, 99))
+        what = "jitter of samples at 1 kHz as a subscriber sees it, p99"
+        yield Row(what, f"{p99:.3f} ms (p50 {p50:.3f} ms)", "0.2 ms on an idle machine", p99 / 0.2, 1.0, least=False)

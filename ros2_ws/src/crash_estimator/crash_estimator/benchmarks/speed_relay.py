@@ -1,0 +1,82 @@
+"""`relay`: takes samples and says as much as an estimator would, but computes nothing: the price of the messages alone.
+
+The same topics, types, qualities of service and executor; three messages out for each one in, of the sizes given.
+"""
+
+import sys
+from array import array
+from functools import lru_cache
+
+import rclpy
+from crash_msgs.msg import Forces, Parameters, Residuals, Samples
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.task import Future
+
+from crash_replay.qos import EVERY_SAMPLE, STREAM
+from crash_replay.ros_runtime import acknowledge_promptly, spin
+
+FIELDS = {
+    Parameters: {"name": "", "value": 1, "std": 1, "status": 0},
+    Residuals: {
+        "name": "", "measured": 1, "predicted": 1, "innovation": 1, "innovation_std": 1, "residual": 1, "residual_std": 1
+    },
+    Forces: {"element": "", "crush": 1, "rate": 1, "force": 1, "force_std": 1, "state": 0},
+}  # fmt: skip
+"""Message -> its fields of one value a row: a name, a double or a byte."""
+OF_BODIES = ("displacement", "velocity", "acceleration")
+
+
+class Relay(Node):
+    def __init__(self) -> None:
+        super().__init__("relay")
+        width = {kind: self.declare_parameter(kind.__name__.lower(), 1).value for kind in FIELDS}
+        self.width, self.bodies = width, self.declare_parameter("bodies", 1).value
+        topics = {kind: kind.__name__.lower() for kind in FIELDS}
+        self.out = {kind: self.create_publisher(kind, f"~/{topic}", STREAM) for kind, topic in topics.items()}
+        self.create_subscription(Samples, "samples", self._on_samples, EVERY_SAMPLE)
+
+    @lru_cache(maxsize=16)
+    def _empty(self, samples: int) -> list:
+        """Messages for so many samples; they are filled once."""
+        messages = []
+        for kind, fields in FIELDS.items():
+            n, message = self.width[kind], kind(model="none", method="relay")
+            for field, what in fields.items():
+                names = [f"b{k}.stiffness" for k in range(n)]
+                numbers = array("d", bytes(8 * n * samples)) if what else array("B", bytes(n * samples))
+                setattr(message, field, names if what == "" else numbers)
+            if kind is Forces:
+                message.between, message.body = ["a-b"] * n, [f"b{k}" for k in range(self.bodies)]
+                message.mass = array("d", bytes(8 * self.bodies))
+                for field in OF_BODIES:
+                    setattr(message, field, array("d", bytes(8 * self.bodies * samples)))
+            else:
+                message.unit = ["N/m"] * n
+            messages.append(message)
+        return messages
+
+    def _on_samples(self, samples: Samples) -> None:
+        for message in self._empty(len(samples.time_ns)):
+            message.header, message.run, message.number = samples.header, samples.run, samples.number
+            message.time_ns = samples.time_ns
+            self.out[type(message)].publish(message)
+
+
+def main() -> int:
+    acknowledge_promptly()
+    rclpy.init()
+    executor = EventsExecutor()
+    executor.add_node(Relay())
+    try:
+        spin(executor, until=Future())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
