@@ -91,7 +91,7 @@ class Console:
             if self.progress:
                 fresh = time.monotonic() - self.answered_at < SHOWN
                 line = progress_line(self.pacing.player, self.pacing.tally.rate)
-                self._draw(line + (f"  {self.answer}" if fresh and self.answer else ""))
+                self._draw(f"{self.answer}; {line}" if fresh and self.answer else line)
 
     def _draw(self, line: str) -> None:
         line = line[: shutil.get_terminal_size().columns - 1]
