@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
 COMMANDS = [line for block in re.findall(r"```sh\n(.*?)```", README, re.S) for line in block.splitlines() if line]
-LISTENING = [c for c in COMMANDS if "crash_estimator viewer" in c or "crash_estimator estimator" in c]
+LISTENING = [c for c in COMMANDS if any(node in c for node in ("crash_estimator viewer", "crash_estimator estimator", "crash_replay record"))]
 REPLAY = [c for c in COMMANDS if "crash_replay replay" in c]
 THREE = [c for c in COMMANDS if "hidden_effect" in c and "--effects" not in c]
 ALONE = [c for c in COMMANDS if c not in ("make test", *LISTENING, *REPLAY, *THREE)]
@@ -49,12 +49,13 @@ def test_a_command_runs_as_it_stands(command):
     assert "Traceback" not in done.stderr
 
 
-def test_the_three_nodes_find_each_other(tmp_path):
-    assert len(LISTENING) == 2 and len(REPLAY) == 1
-    written = ROOT / "out" / "dummy.rrd"
-    written.unlink(missing_ok=True)
-    written.parent.mkdir(exist_ok=True)
-    logs = [open(tmp_path / f"{k}.log", "w+") for k in range(2)]
+def test_the_nodes_find_each_other(tmp_path):
+    assert len(LISTENING) == 3 and len(REPLAY) == 1
+    written = [ROOT / "out" / "dummy.rrd", ROOT / "out" / "dummy_estimates.mcap"]
+    for file in written:
+        file.unlink(missing_ok=True)
+        file.parent.mkdir(exist_ok=True)
+    logs = [open(tmp_path / f"{k}.log", "w+") for k in range(3)]
     nodes = [
         subprocess.Popen(shlex.split(c), cwd=ROOT, env=environment(72), stdout=log, stderr=log)
         for c, log in zip(LISTENING, logs)
@@ -75,8 +76,8 @@ def test_the_three_nodes_find_each_other(tmp_path):
         text = log.read()
         log.close()
         assert "Traceback" not in text and "not seen" not in text, text
-    assert statuses == [0, 0]
-    assert written.stat().st_size > 100_000
+    assert statuses == [0, 0, 0]
+    assert all(file.stat().st_size > 100_000 for file in written)
 
 
 @pytest.mark.parametrize("name", sorted(set(re.findall(r"`(ros2_ws/src/[\w/]+|bags/[\w.]+)`", README))))
