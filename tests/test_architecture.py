@@ -19,6 +19,13 @@ def test_the_core_imports_neither_ros_nor_the_viewer():
     assert not loaded & {"rclpy", "rerun", "crash_msgs", "rosbags", "pydantic", "crash_estimator.nodes"}
 
 
+def test_following_a_test_needs_no_ros():
+    loaded = modules_after(
+        "import crash_estimator.following.follower, crash_estimator.following.alignment, crash_estimator.following.again"
+    )
+    assert "crash_estimator.kept" in loaded and not loaded & {"rclpy", "rerun", "crash_msgs"}
+
+
 def test_recordings_bags_and_the_player_work_without_ros():
     loaded = modules_after("import crash_replay.bag, crash_replay.readers, crash_replay.player, crash_replay.conditioning")
     assert not loaded & {"rclpy", "rerun", "crash_estimator"}

@@ -206,7 +206,7 @@ def test_a_pass_of_which_much_was_not_seen_is_not_judged(stage, case, capfd):
     stage.send_test(case[2])
     count = len(stage.heard["diagnosis"]["ranking"])
     stage.send(case[2], 600, 700, run=2)
-    stage.spin(0.3)
+    stage.spin_until(lambda: stage.diagnoses[0].stopped, "it has asked for them in vain")
     assert len(stage.heard["diagnosis"]["ranking"]) == count
     assert "samples were not seen: nothing is said on this pass" in capfd.readouterr().err
 

@@ -76,7 +76,7 @@ def test_back_ahead_round_and_late(stage, recording, whole):
     seek(90)  # ahead, over samples that were
     burst(90, 30)
     for method in METHODS:
-        heard = stage.wait_for(method, len(expected))
+        heard = stage.wait_for(method, len(expected), patience=60.0)
         assert numbers(heard["parameters"]) == expected
         assert_exact(heard["parameters"], whole[method])
         lost = [event for event in heard["events"] if event.kind == "lost"]
@@ -92,7 +92,7 @@ def test_back_ahead_round_and_late(stage, recording, whole):
     stage.node.create_subscription(ReplayState, "replay_state", states.append, LATCHED)
     stage.spin_until(lambda: states and states[-1].subscribers == 3, "the replay has found it")
     burst(120, 30)
-    late = stage.wait_for("late", 30)
+    late = stage.wait_for("late", 30, patience=60.0)
     assert numbers(late["parameters"]) == list(range(120, 150))
     assert_exact(late["parameters"], whole["mrls"])
     lost = [event.text for event in late["events"] if event.kind == "lost"]
@@ -100,14 +100,17 @@ def test_back_ahead_round_and_late(stage, recording, whole):
     assert [(s.number, s.holds_from, s.asked_again) for s in late["state"]] == [(120, 0, 120)]
 
 
-def test_killed_and_started_again_it_goes_on_as_if_nothing_had_been(stage, recording, whole):
+@pytest.mark.parametrize("lockstep", [False, True])
+def test_killed_and_started_again_it_goes_on_as_if_nothing_had_been(stage, recording, whole, lockstep):
+    """In lock-step the replay does not wait for the dead for ever either."""
     stage.add_estimator("witness", model=MODEL, method="mrls")
     victim = stage.listen("victim")
     process = stage.start("crash_estimator.nodes.estimator_node", "victim", model=MODEL, method="mrls")
-    stage.replay(BAG, wait_for=2, wait_timeout=100.0, rate=0.015)
+    stage.replay(BAG, wait_for=2, wait_timeout=100.0, rate=0.015, lockstep=lockstep, answer_timeout=2.0)
     stage.spin_until(lambda: len(victim["parameters"]) > 100, "the victim has begun", 100.0)
     process.kill()
     process.wait()
+    stage.spin(0.3)  # what it had sent
     before = len(victim["parameters"])
     stage.start("crash_estimator.nodes.estimator_node", "victim", model=MODEL, method="mrls")
     stage.spin_until(lambda: len(victim["parameters"]) > before + 50, "the victim is back", 100.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from crash_msgs.msg import Answer
 from helpers_estimation import oscillator_recording
-from helpers_estimator_node import TIME_ZERO, Stage, empty_samples, joined
+from helpers_estimator_node import MODEL, TIME_ZERO, Stage, empty_samples, joined
 from numpy.testing import assert_array_equal
 
 from crash_estimator.core.estimate import Estimate
@@ -22,19 +22,6 @@ from crash_replay.recording import Recording, Test
 from crash_replay.ros_messages import stamp_ns
 
 BAGS = Path(__file__).resolve().parent.parent / "bags"
-MODEL = """
-name: oscillator
-bodies:
-  block: {mass: 10, acceleration: block_ax}
-  wall: {fixed: true}
-elements:
-  spring:
-    between: [block, wall]
-    stiffness: {estimate: true, initial: 1.0e4, min: 0.0}
-    damping: {estimate: true, initial: 0.0, std: 100.0}
-    displacement: travel
-    velocity: speed
-"""
 
 
 @pytest.fixture

@@ -25,9 +25,10 @@ PARTS = ("steps", "growth", "throughput", "latency", "jitter", "viewer", "real_t
 ABOUT = """\
 # Speed
 
-Made by `make benchmark` on {machine}, {cores} cores, load {load:.1f} before it began; {when}. Each row is measured beside its
-reference in the same run, in turns; a ratio holds on another machine, a time does not. A machine that does other work
-makes every row worse, those with several processes most.
+Made by `make benchmark` on {machine}, {cores} cores, load {load:.1f} before it began; {when}.
+
+Each row is measured beside its reference in the same run, in turns; a ratio holds on another machine, a time does not.
+A machine that does other work makes every row worse, those with several processes most.
 """
 
 
@@ -50,7 +51,8 @@ def benchmark(arguments: argparse.Namespace) -> None:
             rows += part()
     print(table(HEAD, [row.cells() for row in rows]))
     if tuple(arguments.only) == PARTS:
-        about = ABOUT.format(machine=platform.machine(), cores=os.cpu_count(), load=load, when=time.strftime("%Y-%m-%d"))
+        here = {"machine": platform.machine(), "cores": os.cpu_count()}
+        about = ABOUT.format(**here, load=load, when=time.strftime("%Y-%m-%d"))
         page = [about, markdown_table(HEAD, [row.cells() for row in rows]), ""]
         print(write_markdown(Path(arguments.to) / "benchmark.md", page))
 

@@ -93,7 +93,8 @@ class Graph:
         self.children.start(name, "crash_estimator", "estimator", node=name, model=str(model), method=method)
 
     def relay(self, name: str, **sizes: int) -> None:
-        command = [sys.executable, "-m", "crash_estimator.benchmarks.speed_relay", "--ros-args", "-r", f"__node:={name}"]
+        command = [sys.executable, "-m", "crash_estimator.benchmarks.speed_relay"]
+        command += ["--ros-args", "-r", f"__node:={name}"]
         for key, value in sizes.items():
             command += ["-p", f"{key}:={value}"]
         log = self.children.logs / f"{name}.log"
@@ -125,10 +126,8 @@ class Graph:
         listener.first = 0.0
         before = listener.heard
         parameters |= {"loop": True} if seconds else {}
-        child = self.children.start(
-            "replay", "crash_replay", "replay", bag=str(bag), wait_for=listeners, wait_timeout=PATIENCE, progress="false",
-            keyboard="false", **parameters,
-        )  # fmt: skip
+        parameters |= {"wait_for": listeners, "wait_timeout": PATIENCE, "progress": "false", "keyboard": "false"}
+        child = self.children.start("replay", "crash_replay", "replay", bag=str(bag), **parameters)
         if seconds:
             self.spin_until(lambda: listener.first > 0.0, "the first sample comes")
             self.spin(seconds)

@@ -52,8 +52,8 @@ class Live:
         return Graph(self.folder / f"run{self.runs}", self.environment, names)
 
     def throughput(self) -> Iterator[Row]:
-        effort = self.effort
-        for title, block, seconds in (("single messages", 1, effort.singles), ("blocks as the replay chooses", 0, effort.blocks)):
+        kinds = ("single messages", 1, self.effort.singles), ("blocks as the replay chooses", 0, self.effort.blocks)
+        for title, block, seconds in kinds:
             bag, ours, theirs = self.bag(4, seconds, 10e3), [], []
             for _ in range(self.effort.rounds):
                 theirs.append(self._pass(bag, relay=True, block=block))
@@ -106,7 +106,8 @@ class Live:
             if highest:
                 run = graph.replay(bag, 2, self.effort.hold, rate=highest / recorded)
                 kept, block = run.rate / (highest / recorded), run.sent / run.messages
-                said = f"{highest / 1e3:g} kHz, {self.effort.hold:g} s: {kept:.3f} of it, {run.lost} lost, {block:.3g} a message"
+                said = f"{highest / 1e3:g} kHz, {self.effort.hold:g} s: {kept:.3f} of it, {run.lost} lost"
+                said += f", {block:.3g} a message"
                 if kept < KEPT or run.lost:
                     highest = 0.0
             else:
@@ -127,7 +128,7 @@ class Live:
                     delay = latencies(graph, recording, 1000.0, self.effort.latency)
                     all_of_it.append(delay[len(delay) // 10 :])
         for share, reach in ((50, None), (99, 1.5)):
-            ours, theirs = (min(np.percentile(delay, share) for delay in found[kind]) for kind in ("estimator", "relay"))
+            ours, theirs = (min(np.percentile(d, share) for d in found[kind]) for kind in ("estimator", "relay"))
             said = f"{ours * 1e3:.3f} ms", f"bare relay {theirs * 1e3:.3f} ms"
             yield Row(f"latency sample to parameters at 1 kHz, p{share}", *said, ours / theirs, reach, least=False)
 

@@ -76,8 +76,9 @@ class Compiled:
         """theta (p,) after the whole record."""
         n, q, p = problem.psi.shape
         theta, covariance = problem.initial.copy(), np.diag(problem.std**2)
-        arrays = (problem.psi, problem.target, problem.walk, problem.active, problem.noise, problem.lower, problem.scale)
-        self.library.constrained_kalman(n, p, q, *map(_pointer, (*arrays, theta, covariance)))
+        samples = problem.psi, problem.target, problem.walk, problem.active
+        arrays = *samples, problem.noise, problem.lower, problem.scale, theta, covariance
+        self.library.constrained_kalman(n, p, q, *map(_pointer, arrays))
         return theta
 
     def mrls(self, problem: Problem, forgetting: float, m: int, cr: float, limit: float, rewinds: int) -> np.ndarray:

@@ -20,7 +20,8 @@ from crash_replay.ros_runtime import acknowledge_promptly, spin
 FIELDS = {
     Parameters: {"name": "", "value": 1, "std": 1, "status": 0},
     Residuals: {
-        "name": "", "measured": 1, "predicted": 1, "innovation": 1, "innovation_std": 1, "residual": 1, "residual_std": 1
+        "name": "", "measured": 1, "predicted": 1,
+        "innovation": 1, "innovation_std": 1, "residual": 1, "residual_std": 1,
     },
     Forces: {"element": "", "crush": 1, "rate": 1, "force": 1, "force_std": 1, "state": 0},
 }  # fmt: skip

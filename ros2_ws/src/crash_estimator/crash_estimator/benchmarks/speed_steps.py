@@ -83,7 +83,8 @@ def _records(structure, recording, problem: Problem, compiled: Compiled | None) 
     yield _beside("constrained Kalman filter, a sample of a record", alone, limits.get("constrained_kalman"), 5.0)
     for method, settings in (("constrained_kalman", {}), ("mrls", SETTINGS)):
         estimator = make_estimator(structure, recording.test, method, **settings)
-        record = per_call(lambda: estimator.follow(estimator.init(), recording.time_ns, recording.values)) / len(recording)
+        everything = recording.time_ns, recording.values
+        record = per_call(lambda: estimator.follow(estimator.init(), *everything)) / len(recording)
         name = f"whole estimator, {method}, a sample of a record"
         yield _beside(name, record, limits.get(method), None, ", recursion alone")
         readable = make_estimator(structure, recording.test, method, compiled=False, **settings)

@@ -32,6 +32,8 @@ WRITING = 20.0
 """s that the viewer has to finish its file."""
 ANSWERING = 240.0
 """s that the diagnosis has for its answer after the last sample, and again with what it has added."""
+ESTIMATING = 20.0
+"""s that an estimator then has to estimate all samples again."""
 MISSING = ("Missing effect", "which effect the model lacks, and its error, fit by fit; shaded where the model fails")
 LOOK_AT = (
     ("Overview", "measured and predicted acceleration; the residual leaves its 99 % band where a model fails"),
@@ -49,6 +51,7 @@ class Run:
         self.choices = {choice.name: choice for choice in choices}
         self.story = Story() if "diagnosis" in self.children else None
         self.dead: set[str] = set()  # those that ended though they should not have
+        self.changed = False  # an estimator's model
         self.gave_up = False  # the diagnosis: it says why, and nothing more
         self.ended_at = 0.0  # when the replay had ended and something came for the last time
         self.heard = 0
@@ -116,7 +119,8 @@ class Run:
             doing = "judging the model with it" if answers else "comparing every candidate on all samples"
             self.terminal.wait(doing, waited)
         self.terminal.clear()
-        for _ in range(3):  # its last curves, and what the estimators say to it
+        deadline = time.monotonic() + (ESTIMATING if self.story.added else 3 * PERIOD)  # and its last curves
+        while time.monotonic() < deadline and not (self.story.added and self.changed):
             self._listen(watch, executor)
 
     def _is_over(self, watch: Watch) -> bool:
@@ -137,6 +141,7 @@ class Run:
         for name, child in self.children.items():
             for level, text in child.messages():
                 changed = name in self.choices and text.startswith("revision ")  # an effect has been added to its model
+                self.changed |= changed
                 if level in ("WARN", "ERROR", "FATAL") or name == "viewer" or changed:
                     self.terminal.say(f"{'added to ' * changed}{name}: {text}")
                 self.gave_up |= name == "diagnosis" and level in ("ERROR", "FATAL")

@@ -28,6 +28,11 @@ class Story:
         """Whether the last answer that is to be expected has come: with what was found added, if anything was."""
         return bool(self.finals) and (not self.finals[min(self.finals)].found or len(self.finals) > 1)
 
+    @property
+    def added(self) -> bool:
+        """Whether an effect was added."""
+        return len(self.finals) > 1
+
     def misfit(self, block: MisfitBlock) -> list[str]:
         """Where the model as it was given fails, and what it lacks: told with the first answer on all samples."""
         if self.lacks is None:
@@ -43,7 +48,7 @@ class Story:
         if block.revision in self.finals:
             return []
         self.finals[block.revision] = block
-        if len(self.finals) > 1:
+        if self.added:
             return self._after(block)
         self.lacks = _lacks(block)
         errors = f"error {G.factor * block.rms_before:.3g} {G.unit}, noise floor {G.factor * block.noise_floor:.3g}"

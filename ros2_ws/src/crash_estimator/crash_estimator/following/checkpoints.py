@@ -2,7 +2,7 @@
 
 At most `LIMIT` are kept: where there would be more, every second one goes and the next ones come half as often. So
 after n samples they are `stride` <= max(STRIDE, 2 n / LIMIT) samples apart, and take LIMIT times a state's memory
-(2 kB to 50 kB), whatever n.
+(3 kB to 54 kB for a dummy, by method: 0.4 to 7 MB), whatever n.
 """
 
 from bisect import bisect_right

@@ -15,10 +15,6 @@ from ..kept import Kept, Rows
 from .checkpoints import Checkpoints
 from .columns import Columns, follow
 
-CHUNK = 256
-"""Samples that are folded in one go on the way to a sample."""
-
-
 class Follower:
     def __init__(self, estimator: AnyEstimator, kept: Kept, floor: int = 0):
         """floor: number of the first sample that counts; those before are left out, as if never seen."""
@@ -56,7 +52,7 @@ class Follower:
         if start <= self.position < number:
             start, state = self.position, self.state
         columns = None
-        for rows in self.kept.runs(max(start, self.floor), number, CHUNK):
+        for rows in self.kept.runs(max(start, self.floor), number, self.checkpoints.stride):
             state, columns = follow(self.estimator, state, rows)
             self.checkpoints.offer(rows.end, state)
         self.position, self.state = number, state

@@ -10,8 +10,8 @@ from rclpy.task import Future
 from ..kept import Rows
 from .samples import rows_of
 
-PATIENCE = 2.0
-"""s of wall clock for an answer; a replay that has ended gives none."""
+PATIENCE = 10.0
+"""s of wall clock for an answer; a replay that has ended is gone before."""
 DISCOVERY = 1.0
 """s after the test has come in which the replay's service may still be found: topics are found before it."""
 
@@ -71,9 +71,9 @@ class Asking:
             return
         if not self.call:
             self._call_if_found()
-        late = time.monotonic() - self.asked > PATIENCE if self.call else self._in_vain()
-        if late:
+        late = time.monotonic() - self.asked > PATIENCE or not self.client.service_is_ready()
+        if late if self.call else self._in_vain():
             if self.call:
-                self.node.get_logger().warning(f"{self.client.srv_name} has not answered for {PATIENCE:g} s")
+                self.node.get_logger().warning(f"{self.client.srv_name} has not answered: going on without")
             self._forget()
             self.done(None)

@@ -148,7 +148,7 @@ class DiagnosisNode(Node):
     def _begin_anew(self) -> None:
         """What was asked is no longer the question."""
         self.asked, self.stopped, self.cannot_be_had = None, False, False
-        self.asking.forget()
+        self.asking.begin_test()
         self.telling.begin_pass()
         self.worker.drop()
 
