@@ -1,14 +1,19 @@
 """Terminal tables of what an estimator found, in the units crash engineers read."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from .core.effects.base import Effect
 from .core.errors import EquationError
 from .core.estimate import Description, Estimate, ParameterStatus
+from .core.structure import EffectSpec
 
 READABLE = {"N/m": ("kN/m", 1e-3), "N*s/m": ("N s/m", 1.0), "m/s^2": ("g", 1.0 / 9.80665), "N": ("kN", 1e-3), "kg": ("kg", 1.0)}
 """SI unit -> the unit shown and the factor to it."""
+
+OF_ELEMENTS = ("N/m", "N*s/m", "kg")
+"""Units in which a tenth is fine enough; an effect's coefficient, such as a gain of 0.07, may be of any size."""
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -31,11 +36,12 @@ def parameter_table(description: Description, estimates: Sequence[Estimate]) -> 
         peak = estimates[-1] if element is None else max(estimates, key=lambda estimate: abs(estimate.force[element]))
         shown, factor = READABLE.get(unit, (unit, 1.0))
         known = ParameterStatus(peak.status[k]) == ParameterStatus.KNOWN
+        value, sigma = (".1f", ".1f") if unit in OF_ELEMENTS else (".4g", ".2g")
         rows.append(
             (
                 name,
-                f"{peak.parameters[k] * factor:.1f}",
-                "" if known else f"{peak.std[k] * factor:.1f}",
+                f"{peak.parameters[k] * factor:{value}}",
+                "" if known else f"{peak.std[k] * factor:{sigma}}",
                 shown,
                 ParameterStatus(peak.status[k]).name.lower(),
                 f"{peak.time_ns * 1e-6:.1f}",
@@ -44,6 +50,16 @@ def parameter_table(description: Description, estimates: Sequence[Estimate]) -> 
             )
         )
     return table(("parameter at peak force", "value", "sigma", "unit", "status", "at ms", "crush mm", "force kN"), rows)
+
+
+def known_effects_table(given: Sequence[EffectSpec], effects: Mapping[str, Effect], description: Description) -> str:
+    """Effects with a known coefficient that is no parameter: it is in an element, a mass or the samples; or nothing."""
+    rows = [
+        (spec.type, spec.target, f"{spec.coefficient:.4g}", effects[spec.type].unit, "known")
+        for spec in given
+        if spec.coefficient is not None and f"{spec.target}.{spec.type}" not in description.parameters
+    ]
+    return table(("effect of the model", "on", "value", "unit", "status"), rows) if rows else ""
 
 
 def besides_table(description: Description, last: Estimate) -> str:

@@ -13,7 +13,7 @@ from ..core.estimate import Description, Estimate, ParameterStatus
 from ..core.fold import run
 from ..core.methods import METHODS, make_estimator
 from ..model_file import load_model, ready_models
-from ..tables import besides_table, error_table, parameter_table
+from ..tables import besides_table, error_table, known_effects_table, parameter_table
 from .common import add_effects_option, effects_of, guarded, parse_settings, write_json
 
 
@@ -38,13 +38,16 @@ def estimate(arguments: argparse.Namespace) -> None:
     structure = load_model(arguments.model)
     recording = read_bag(arguments.bag)
     settings = parse_settings(arguments.set) | ({"effective_mass": True} if arguments.effective_mass else {})
-    estimator = make_estimator(structure, recording.test, arguments.method, effects=effects_of(arguments), **settings)
+    effects = effects_of(arguments)
+    estimator = make_estimator(structure, recording.test, arguments.method, effects=effects, **settings)
     estimates = run(estimator, recording.samples())
     description, errors = estimator.description, equation_errors(estimator.description, estimates)
     print(f"{recording.test.id}: {len(recording)} samples, model {description.model}, method {description.method}")
     print()
     print(parameter_table(description, estimates))
     print()
+    if known := known_effects_table(structure.effects, effects, description):
+        print(f"{known}\n")
     print(error_table(errors))
     if description.extra:
         print()
