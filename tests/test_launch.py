@@ -35,7 +35,8 @@ class ParameterValue:
         self.of, self.value_type = value, value_type
 
     def value(self, given):
-        return self.value_type(self.of.value(given))
+        value = self.of.value(given)
+        return value.lower() == "true" if self.value_type is bool else self.value_type(value)
 
 
 class IfCondition:
@@ -126,6 +127,14 @@ def test_the_diagnosis_is_started_where_it_is_asked_for_and_the_replay_waits_for
     assert "diagnosis" not in launched(bag="b", model="m")
 
 
+def test_what_is_estimated_is_recorded_where_a_file_is_named(launched):
+    nodes = launched(bag="b", model="m", record="out/e.mcap", lockstep="true")
+    assert (nodes["record"].package, nodes["record"].to) == ("crash_replay", "out/e.mcap")
+    assert nodes["replay"].wait_for == 3
+    assert (nodes["replay"].lockstep, nodes["replay"].loop, nodes["replay"].start_paused) == (True, False, False)
+    assert "record" not in launched(bag="b", model="m")
+
+
 def test_the_parameters_are_those_of_the_nodes(launched):
     nodes = launched(bag="b", model="m", diagnosis="true")
     assert set(vars(nodes["replay"])) - {"package"} <= set(PARAMETERS)
@@ -136,7 +145,7 @@ def test_the_parameters_are_those_of_the_nodes(launched):
 
 
 def test_the_executables_and_the_launch_file_are_installed(launched):
-    nodes = launched(bag="b", model="m", diagnosis="true")
+    nodes = launched(bag="b", model="m", diagnosis="true", record="e.mcap")
     for name, node in nodes.items():
         assert f'"{name} = {node.package}.' in (PACKAGES / node.package / "setup.py").read_text()
     assert 'glob("launch/*.launch.py")' in (PACKAGES / "crash_estimator/setup.py").read_text()

@@ -1,16 +1,20 @@
 """What `record` writes, and what it says when it cannot."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from crash_msgs import msg
+from crash_msgs.srv import Step
 from mcap.reader import make_reader
-from helpers_replay import some_recording
+from helpers_replay import Listener, Replay, environment, some_recording, wait_until
 from rclpy.serialization import serialize_message
 
+from crash_replay.bag import write_bag
 from crash_replay.message_types import encode_test
-from crash_replay.record_node import wrong_with
+from crash_replay.record_node import RecordError, reserved, write
 from crash_replay.recorder import Heard, Recorder, stamp_of
 
 EVENTS, TEST = Heard("/a/events", "crash_msgs/msg/Event", False), Heard("/test", "crash_msgs/msg/TestInfo", True)
@@ -53,13 +57,62 @@ def test_messages_are_written_by_their_stamps_whenever_they_came(tmp_path):
 
 @pytest.mark.parametrize(
     ("file", "said"),
-    [("", "must be a file that ends in .mcap"), ("e.bag", "ends in .mcap"), ("no/e.mcap", "there is no folder"), ("there.mcap", "exists already")],
-)  # fmt: skip
+    [
+        ("", "must be a file that ends in .mcap, got ''"),
+        ("e.bag", "ends in .mcap"),
+        ("no/e.mcap", "there is no folder no"),
+        ("there.mcap", "exists already"),
+        ("/proc/e.mcap", "/proc/e.mcap cannot be written"),
+    ],
+)
 def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path, monkeypatch, file, said):
     monkeypatch.chdir(tmp_path)
-    Path("there.mcap").touch()
-    assert said in wrong_with(Path(file))
+    Path("there.mcap").write_text("kept")
+    with pytest.raises(RecordError, match=said):
+        reserved(file)
+    assert Path("there.mcap").read_text() == "kept"
 
 
-def test_a_new_name_is_accepted(tmp_path):
-    assert wrong_with(tmp_path / "e.mcap") == ""
+def test_where_nothing_came_no_file_is_left(tmp_path):
+    file = reserved(str(tmp_path / "e.mcap"))
+    with pytest.raises(RecordError, match="nothing came"):
+        write(Recorder(), file)
+    assert not file.exists()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        (["to:=5"], "expecting type 'STRING'"),
+        (["to:=e.mcap", "wait_for:=-1"], "wait_for"),
+        (["to:=e.bag"], "must be a file that ends in .mcap, got 'e.bag'"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(tmp_path, parameters, said):
+    command = [sys.executable, "-m", "crash_replay.record_node", "--ros-args"]
+    for parameter in parameters:
+        command += ["-p", parameter]
+    ended = subprocess.run(command, env=environment(), cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert (ended.returncode, ended.stdout) == (1, "")
+    assert ended.stderr.startswith("error: ") and said in ended.stderr and ended.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_it_records_the_samples_and_ends_when_the_replay_is_gone(tmp_path):
+    """The replay is ended by a signal, before its last sample."""
+    bag, file = write_bag(some_recording(), tmp_path / "b.mcap"), tmp_path / "e.mcap"
+    command = [sys.executable, "-m", "crash_replay.record_node", "--ros-args", "-p", f"to:={file}", "-p", "wait_for:=0"]
+    recorder = subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, text=True)
+    try:
+        with Replay(bag, start_paused=True, keep_alive=True, wait_for=2) as replay, Listener() as listener:
+            wait_until(lambda: listener.states and listener.states[-1].subscribers == 2, timeout=30.0)
+            assert listener.call(Step, "step", n=3).success
+            wait_until(lambda: len(listener.numbers()) == 3)
+            replay.interrupt()
+        told, _ = recorder.communicate(timeout=30)
+    finally:
+        if recorder.poll() is None:
+            recorder.kill()
+            recorder.communicate()
+    assert (recorder.returncode, told) == (0, f"{file}: 4 messages on 2 topics\n")
+    assert [topic for topic, _ in recorded(file)] == ["/test", "/samples", "/samples", "/samples"]

@@ -17,6 +17,10 @@ ARGUMENTS = {  # name: (default or None, meaning)
     "model": (None, "a ready model's name, or a .yaml file"),
     "method": ("constrained_kalman", "estimation method"),
     "rate": ("0.01", "replay, times real time"),
+    "lockstep": ("false", "wait at each sample until the estimator has answered it"),
+    "loop": ("false", "replay again after the last sample"),
+    "start_paused": ("false", "wait for the replay's service resume, step or burst"),
+    "record": ("", "new .mcap file for what is estimated (empty: not recorded)"),
     "diagnosis": ("false", "say which physical effect the model lacks (true: it is published as the samples come)"),
     "viewer": ("true", "show it in Rerun (false: estimate only)"),
     "rrd": ("crash.rrd", "file that the viewer writes"),
@@ -32,9 +36,11 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(name, default_value=default, description=meaning)
         for name, (default, meaning) in ARGUMENTS.items()
     ]
-    viewer, diagnosis = LaunchConfiguration("viewer"), LaunchConfiguration("diagnosis")
+    viewer, diagnosis, record = (LaunchConfiguration(name) for name in ("viewer", "diagnosis", "record"))
     is_on = "'.lower() in ('true', '1'))"
-    listeners = PythonExpression(["1 + ('", viewer, is_on, " + ('", diagnosis, is_on])  # the estimator and these
+    recorded = PythonExpression(["'", record, "' != ''"])
+    # the estimator and these
+    listeners = PythonExpression(["1 + ('", viewer, is_on, " + ('", diagnosis, is_on, " + ('", record, "' != '')"])
     replay = Node(
         package="crash_replay",
         executable="replay",
@@ -43,6 +49,9 @@ def generate_launch_description() -> LaunchDescription:
             {
                 "bag": text("bag"),
                 "rate": ParameterValue(LaunchConfiguration("rate"), value_type=float),
+                "lockstep": ParameterValue(LaunchConfiguration("lockstep"), value_type=bool),
+                "loop": ParameterValue(LaunchConfiguration("loop"), value_type=bool),
+                "start_paused": ParameterValue(LaunchConfiguration("start_paused"), value_type=bool),
                 "wait_for": ParameterValue(listeners, value_type=int),
                 "wait_timeout": 300.0,  # after an update the estimator compiles its code first
             }
@@ -68,4 +77,11 @@ def generate_launch_description() -> LaunchDescription:
         parameters=[{"rrd": text("rrd")}],
         condition=IfCondition(viewer),
     )
-    return LaunchDescription([*arguments, replay, estimator, diagnose, show])
+    write = Node(
+        package="crash_replay",
+        executable="record",
+        output="screen",
+        parameters=[{"to": text("record")}],
+        condition=IfCondition(recorded),
+    )
+    return LaunchDescription([*arguments, replay, estimator, diagnose, show, write])

@@ -25,6 +25,13 @@ EVERY_SAMPLE = QoSProfile(
 )
 """To subscribe to `samples` with: replay then waits for a subscriber that is slow. Others lose what overruns them."""
 
+EVERY_SAMPLE_SAID = QoSProfile(
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    history=HistoryPolicy.KEEP_ALL,
+)
+"""The same of what is kept for late joiners."""
+
 SAID = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,

@@ -52,11 +52,12 @@ class Recorder:
         return sum(map(len, self.messages.values()))
 
     def write(self, file: Path) -> None:
-        """Write all that came, or nothing if no message with a stamp has come."""
+        """Write all that came; what has no stamp first, with the first stamp."""
         topics = sorted(self.messages)
         stamped = sorted(self._stamped(topics))
         first = stamped[0][0] if stamped else 0
-        latched = [(k, first, n) for k, topic in enumerate(topics) if topic.latched for n in range(len(self.messages[topic]))]
+        counts = [(k, len(self.messages[topic])) for k, topic in enumerate(topics) if topic.latched]
+        latched = [(k, first, n) for k, count in counts for n in range(count)]
         ordered = [*latched, *((k, stamp, n) for stamp, k, n in stamped)]
         write_mcap(
             file,

@@ -14,7 +14,8 @@ from .qos import LATCHED, SAID, STREAM
 from .recording import Recording
 from .ros_messages import channel_to_msg, channel_type, samples_to_msg, stamp, test_to_msg, time_zero_ns
 
-
+UNNAMED = "_NODE_NAME_UNKNOWN_"
+"""As rcl calls the node of a publisher that was found before its node was."""
 OVERRIDABLE = QoSOverridingOptions.with_default_policies()
 
 
@@ -64,9 +65,9 @@ class ReplayTopics:
             time.sleep(0.0005)
 
     def _listeners(self) -> set[str]:
-        """Full names of the nodes that publish answers."""
+        """Full names of the nodes that publish answers, but of those just found whose names are still to come."""
         found = self.node.get_publishers_info_by_topic(self.answers.topic_name)
-        return {f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in found}
+        return {f"{i.node_namespace.rstrip('/')}/{i.node_name}" for i in found if i.node_name != UNNAMED}
 
     def _on_answer(self, message: Answer) -> None:
         self.lockstep.answer(message.node, Answered(message.run, message.number, message.missed))

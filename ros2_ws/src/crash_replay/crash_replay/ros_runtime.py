@@ -1,9 +1,15 @@
 """What a node needs of rclpy and the middleware beside its topics."""
 
 import os
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
-from rclpy.executors import Executor
+import rclpy
+from rclpy.exceptions import ParameterException
+from rclpy.executors import Executor, ExternalShutdownException
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
 from rclpy.task import Future
 
 PROFILES = Path(__file__).with_name("fastdds.xml")
@@ -24,3 +30,34 @@ def spin(executor: Executor, until: Future) -> None:
     """
     while not until.done():
         executor.spin_until_future_complete(until, timeout_sec=3600.0)
+
+
+def run(
+    make: Callable[[], Node],
+    at_fault: tuple[type[Exception], ...],
+    until: Callable[[Node], Future] = lambda node: Future(),
+    close: Callable[[Node], None] = lambda node: None,
+) -> int:
+    """Make a node and run it until the future is done or a signal ends it -> exit status.
+
+    at_fault: what data, model or parameters raise: one line on standard error, exit status 1; close: called at the end.
+    """
+    acknowledge_promptly()
+    rclpy.init()
+    node = None
+    try:
+        node = make()
+        executor = EventsExecutor()
+        executor.add_node(node)
+        spin(executor, until(node))
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except (*at_fault, ParameterException) as error:
+        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
+        return 1
+    finally:
+        if node is not None:
+            close(node)
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0

@@ -8,22 +8,17 @@ a new revision of its model, and the same question is asked of it on the samples
 import sys
 from collections.abc import Callable
 
-import rclpy
 from crash_msgs.msg import Samples, TestInfo
 from crash_msgs.srv import AddEffect, RemoveEffect
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
-from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.subscription import Subscription
-from rclpy.task import Future
 
 from crash_replay.bag import read_bag
 from crash_replay.qos import EVERY_SAMPLE, LATCHED
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import stamp, stamp_ns, test_from_msg
-from crash_replay.ros_runtime import acknowledge_promptly, spin
+from crash_replay.ros_runtime import run
 
 from ..core.diagnosis.live_answer import LiveAnswer
 from ..core.effects import EFFECTS
@@ -241,27 +236,7 @@ class DiagnosisNode(Node):
 
 
 def main() -> int:
-    acknowledge_promptly()
-    rclpy.init()
-    try:
-        node = DiagnosisNode()
-    except (ModelError, RecordingError, ParameterException) as error:
-        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
-        rclpy.try_shutdown()
-        return 1
-    executor = EventsExecutor()
-    executor.add_node(node)
-    try:
-        spin(executor, until=Future())  # never done: a signal ends it
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except WorkerError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
+    return run(DiagnosisNode, (ModelError, RecordingError, WorkerError))
 
 
 if __name__ == "__main__":

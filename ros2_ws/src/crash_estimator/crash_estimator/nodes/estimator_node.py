@@ -11,22 +11,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import rclpy
 from builtin_interfaces.msg import Time
 from crash_msgs.msg import EstimatorState, Samples, TestInfo
 from crash_msgs.srv import AddEffect, RemoveEffect
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
-from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
-from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from crash_replay.qos import EVERY_SAMPLE, LATCHED, UNLATCHED
 from crash_replay.recording import Channel, RecordingError, Test
 from crash_replay.ros_messages import add_ns, test_from_msg
-from crash_replay.ros_runtime import acknowledge_promptly, spin
+from crash_replay.ros_runtime import run
 
 from ..cli.common import parse_settings
 from ..core.effects import EFFECTS
@@ -306,24 +301,7 @@ class EstimatorNode(Node):
 
 
 def main() -> int:
-    acknowledge_promptly()
-    rclpy.init()
-    try:
-        node = EstimatorNode()
-    except (ModelError, RecordingError, ParameterException) as error:
-        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
-        rclpy.try_shutdown()
-        return 1
-    executor = EventsExecutor()
-    executor.add_node(node)
-    try:
-        spin(executor, until=Future())  # never done: a signal ends it
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
+    return run(EstimatorNode, (ModelError, RecordingError))
 
 
 if __name__ == "__main__":

@@ -12,19 +12,15 @@ import time
 from collections.abc import Callable, Hashable, Sequence
 from functools import cache, partial
 
-import rclpy
 from crash_msgs.msg import ReplayState, Samples, TestInfo
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
-from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
 from crash_replay.qos import LATCHED, SAID, STREAM
-from crash_replay.ros_runtime import acknowledge_promptly, spin
+from crash_replay.ros_runtime import run
 
 from ..core.structure import Structure
 from ..model_file import load_model, ready_models
@@ -150,26 +146,13 @@ def structure_named(paths: Sequence[str], name: str) -> Structure | None:
 
 
 def main() -> int:
-    acknowledge_promptly()
-    rclpy.init()
-    try:
-        node = ViewerNode()
-    except (OSError, ParameterException) as error:
-        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
-        rclpy.try_shutdown()
-        return 1
-    executor = EventsExecutor()
-    executor.add_node(node)
-    try:
-        spin(executor, until=node.done)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        for line in node.recorder.close():
-            print(line, flush=True)
-        node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
+    return run(ViewerNode, (OSError,), until=lambda node: node.done, close=close)
+
+
+def close(node: ViewerNode) -> None:
+    """Say where what was shown is kept."""
+    for line in node.recorder.close():
+        print(line, flush=True)
 
 
 if __name__ == "__main__":
