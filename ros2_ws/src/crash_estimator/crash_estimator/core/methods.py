@@ -10,7 +10,7 @@ from crash_replay.recording import Sample, Test
 from .compiled.estimator import CompiledEstimator
 from .effects import EFFECTS
 from .effects.applied import applied
-from .effects.base import Effect
+from .effects.base import AttachedBody, BodyForce, BodyInertia, ChannelError, Effect
 from .effects.channels import Corrected, known_errors
 from .estimate import Description, Estimate
 from .estimator import Estimator, Method
@@ -89,10 +89,27 @@ def make_estimator(
         near = get_close_matches(method, METHODS, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise ModelError(f"there is no method {method!r}, only {', '.join(METHODS)}{hint}")
+    errors = known_errors(structure, test, effects)
+    if errors is not None:
+        applied(
+            structure, test, effects
+        )  # says what is wrong with any of them, before those of the channels are taken out
+        left = tuple(
+            e for e in structure.effects if e.coefficient is None or not isinstance(effects[e.type], ChannelError)
+        )
+        structure = replace(structure, effects=left)
+        return Corrected(
+            make_estimator(structure, test, method, damping_after, effective_mass, compiled, effects, **settings),
+            errors,
+        )
+    if effective_mass or method == "effective_mass":
+        _check_masses_alone(structure, effects)
     if effective_mass and method != "effective_mass":
         masses = EffectiveMass(structure, test, MassSettings(theta_settings(structure)))
         return MassFirst(
-            structure, masses, lambda s: make_estimator(s, test, method, damping_after, False, compiled, effects, **settings)
+            structure,
+            masses,
+            lambda s: make_estimator(s, test, method, damping_after, False, compiled, effects, **settings),
         )
     recipe = METHODS[method]
     known = [f.name for f in fields(recipe.kind) if f.init and f.name != "settings"]
@@ -101,13 +118,20 @@ def make_estimator(
             near = get_close_matches(name, known, n=1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
             raise ModelError(f"method {method} has no setting {name!r}, only {', '.join(known)}{hint}")
-    errors = known_errors(structure, test, effects)
-    structure = recipe.structure(applied(structure, test, effects))
+    structure = applied(recipe.structure(structure), test, effects)
     chosen = recipe.kind(theta_settings(structure), **recipe.settings | settings)
     if damping_after is not None and recipe.estimator is Estimator:
         chosen = DampingLater(chosen, damping_after)
     if compiled and structure.first_order and isinstance(chosen, (Rls, Kalman)):
-        estimator = CompiledEstimator(structure, test, chosen, method)
-    else:
-        estimator = recipe.estimator(structure, test, chosen, method)
-    return estimator if errors is None else Corrected(estimator, errors)
+        return CompiledEstimator(structure, test, chosen, method)
+    return recipe.estimator(structure, test, chosen, method)
+
+
+def _check_masses_alone(structure: Structure, effects: Mapping[str, Effect]) -> None:
+    """Raises ModelError where an effect changes the balance of momentum from which effective masses are found."""
+    for spec in structure.effects:
+        if isinstance(effects.get(spec.type), (AttachedBody, BodyForce, BodyInertia, ChannelError)):
+            raise ModelError(
+                f"model {structure.name}: effective masses cannot be found with effect {spec.type} on {spec.target}: "
+                "leave one of them out"
+            )

@@ -40,7 +40,13 @@ def structure_with(structure: Structure, model: Model, present: int) -> Structur
         value, _, shapes = stated(place, model.fit)
         added.append(
             EffectSpec(
-                addition.effect.name, addition.target, value, shapes, addition.host, addition.touches, addition.taken_from,
+                addition.effect.name,
+                addition.target,
+                value,
+                shapes,
+                addition.host,
+                addition.touches,
+                addition.taken_from,
                 addition.variant,
             )  # fmt: skip
         )

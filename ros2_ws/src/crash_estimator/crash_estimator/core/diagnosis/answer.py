@@ -21,7 +21,7 @@ CONFOUNDED = 6.0
 """Nats: evidences closer than this do not tell two candidates apart."""
 
 CFC = 60
-"""The band in which the forces on a barrier and inertias are compared (SAE J211: the motion of a whole structure) ..."""
+"""The band in which a barrier's force and inertias are compared (SAE J211: the motion of a whole structure) ..."""
 
 ACTS = 0.05
 """... while the force is above this share of its peak."""
@@ -75,7 +75,11 @@ class StepReport:
 
 
 def stated(place: Place, fitted: Fit) -> tuple[float, float, dict[str, float]]:
-    """An effect's coefficient as the literature states it, its standard deviation, and its shape constants."""
+    """An effect's coefficient as the literature states it, its standard deviation, and its shape constants.
+
+    A factor's coefficient may be a power of what was fitted, known to a factor: then the standard deviation s of its
+    logarithm is what propagates, and c (exp(s) - 1), the upper side, stands for both.
+    """
     theta, covariance = fitted.theta, fitted.covariance
     shapes = {name: float(np.exp(theta[p])) for name, p in place.shapes.items()}
     effect, c = place.addition.effect, float(theta[place.coefficient])
@@ -92,7 +96,7 @@ def stated(place: Place, fitted: Fit) -> tuple[float, float, dict[str, float]]:
     if not np.isfinite(gradient).all():  # next to nothing, stated as one over it
         return value(at), np.inf, shapes
     variance = float(np.array(gradient) @ covariance[np.ix_(parameters, parameters)] @ np.array(gradient))
-    return value(at), float(np.sqrt(max(variance, 0.0))), shapes
+    return value(at), float(abs(value(at)) * np.expm1(np.sqrt(max(variance, 0.0)) / abs(value(at)))), shapes
 
 
 def place_of(layout: Layout, tried: Tried) -> Place:

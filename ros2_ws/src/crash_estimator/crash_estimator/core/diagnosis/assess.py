@@ -7,7 +7,7 @@ import numpy as np
 
 from .fit import Fit, advance
 from .layout import Layout
-from .linearise import linearise, predicted
+from .linearise import linearise, output_noise, predicted
 from .linkforce import LinkForce
 from .motion import motion_of
 from .records import Record
@@ -59,7 +59,7 @@ def _left(layout: Layout, records: Sequence[Record], theta: np.ndarray, trajecto
         outputs.append(output)
         residuals.append(np.where(record.valid[record.at] > 0.0, record.measured - output, np.nan))
         links.append(equations.links)
-    whitened = [residual / record.noise for residual, record in zip(residuals, records)]
+    whitened = [residual / output_noise(layout, record, theta).std for residual, record in zip(residuals, records)]
     periods = [float(np.median(np.diff(record.time[record.at]))) for record in records]
     white = whiteness(whitened, [record.noise_samples for record in records], periods)
     cost = float(np.nanmean(np.concatenate([w.ravel() for w in whitened]) ** 2))

@@ -117,7 +117,7 @@ def _channels(structure: Structure, forces: bool) -> list[str]:
 
 
 def _attached(structure: Structure, scales: Scales, effect: Effect) -> Iterator[Addition]:
-    """On every unused channel of the model's axis: what feels the body's inertia, and whether its mass was counted in."""
+    """On every unused channel of the model's axis: what feels the body's inertia, and if its mass was counted in."""
     used = {name for _, name, _ in structure.channels()}
     test = scales.records[0].test
     axes = {channel.axis for channel in test.channels if channel.name in used}
@@ -133,7 +133,7 @@ def _attached(structure: Structure, scales: Scales, effect: Effect) -> Iterator[
 
 
 def touching(structure: Structure, addition: Addition) -> list[Addition]:
-    """The same unmodelled body between its host and each body that an element joins to the host, pushing it by a curve."""
+    """The same unmodelled body between its host and each body that an element joins to the host, pushed by a curve."""
     host = structure.bodies[structure.body_index[addition.host]]
     return [replace(addition, touches=name) for name in _neighbours(structure, host)]
 

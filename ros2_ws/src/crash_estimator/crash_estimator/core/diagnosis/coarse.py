@@ -45,4 +45,4 @@ def coarsened(record: Record) -> Record:
 
 def _coarsened(signal: Signal, used: int, per_bin: int, grid: np.ndarray) -> Signal:
     means = signal.values[-used:].reshape(-1, per_bin).mean(axis=1)
-    return signal._replace(time=grid, values=np.concatenate([means[:1], means]))
+    return signal._replace(time=grid, values=np.concatenate([means[:1], means]), noise=signal.noise / np.sqrt(per_bin))

@@ -71,7 +71,9 @@ def slope_changes(knots: np.ndarray, crush_scale: float, force_scale: float) -> 
     return np.vstack([first, np.diff(slopes, axis=0)]), stiffness * std
 
 
-def prior_precision(knots: np.ndarray, crush_scale: float, force_scale: float, roughness: np.ndarray | float) -> np.ndarray:
+def prior_precision(
+    knots: np.ndarray, crush_scale: float, force_scale: float, roughness: np.ndarray | float
+) -> np.ndarray:
     """(n, n) precision of the forces at the knots; the origin's row is to be left out.
 
     roughness: one number, or one for each inner knot (n - 2,).

@@ -73,7 +73,9 @@ class Fit(NamedTuple):
 
 
 @may_diverge
-def solve(layout: Layout, normal: Normal, theta: np.ndarray, inflate: float = 1.0, held: np.ndarray | None = None) -> Step:
+def solve(
+    layout: Layout, normal: Normal, theta: np.ndarray, inflate: float = 1.0, held: np.ndarray | None = None
+) -> Step:
     """Minimum of the quadratic model with the prior, inside the limits (an active set).
 
     inflate: factor on the noise; held (p,): parameters that stay. Raises LinAlgError where nothing is finite.
@@ -203,6 +205,7 @@ def fit(
     cost = step.after
     if least is not None and cost > least[1].before:  # it went astray at a kink of the forces
         (point, _, normal), cost = least, least[1].before
+    cost += normal.grown
     try:
         covariance, log_determinant = _posterior(normal.matrix + layout.prior.precision)
     except LinAlgError:

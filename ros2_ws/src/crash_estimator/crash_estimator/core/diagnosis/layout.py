@@ -42,7 +42,7 @@ class Addition:
 
 
 VARIANTS = ("", "absolute", "one_way", "one_way_back")
-"""A load path carries both ways, its crush counted from time zero; or from where its bodies' displacements are equal; or
+"""A load path carries both ways, its crush counted from time zero; or from where its bodies' displacements agree; or
 compression only, with the second body before the first, or behind it."""
 
 
@@ -221,7 +221,12 @@ def _pair_link(b, addition, index, records, scales, places) -> Link:
     start = [record.initial_displacement for record in records]
     origin = () if addition.variant else tuple(float(x[ends[0]] - x[ends[1]]) for x in start)
     return Link(
-        addition.target, ends, ends, not addition.variant.startswith("one_way"), constant=place.coefficient, origin=origin
+        addition.target,
+        ends,
+        ends,
+        not addition.variant.startswith("one_way"),
+        constant=place.coefficient,
+        origin=origin,
     )
 
 
@@ -239,7 +244,12 @@ def _place(b: Builder, addition: Addition, scales: Scales) -> Place:
         low, high = np.log(shape.low * unit), np.log(shape.high * unit)
         start = np.log(addition.shapes[name])
         shapes[name] = b.add(
-            f"{effect.name} {addition.target} {name}", start, (high - low) / np.sqrt(12.0), 0.5 * (low + high), low, high
+            f"{effect.name} {addition.target} {name}",
+            start,
+            (high - low) / np.sqrt(12.0),
+            0.5 * (low + high),
+            low,
+            high,
         )
     return Place(addition, coefficient, shapes)
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import savgol_coeffs
 
 from ..effects.base import AttachedBody, BodyForce, BodyInertia
 from .layout import Layout, Link, Place
@@ -36,7 +35,7 @@ def linearise(
     towards the motion `target`; blur: steps of time in which contact opens and closes.
     """
     g, bodies = trajectory.a.shape
-    mass, extra_mass = _masses(layout, theta)
+    mass = _masses(layout, theta)
     measured = np.array([_measured(layout, body) for body in range(bodies)], dtype=float)
     inverse = np.where(layout.kind == FREE, 1.0 / mass, measured)
     inverse[layout.kind == DRIVEN] = 0.0
@@ -121,7 +120,7 @@ def _measured(layout: Layout, body: int) -> bool:
     return any(output.body == body and output.fixed for output in layout.outputs)
 
 
-def _masses(layout: Layout, theta: np.ndarray) -> tuple[np.ndarray, None]:
+def _masses(layout: Layout, theta: np.ndarray) -> np.ndarray:
     mass = np.array([body.mass or 1.0 for body in layout.structure.bodies] + [1.0] * len(layout.attached))
     for place in layout.places:
         addition = place.addition
@@ -129,7 +128,7 @@ def _masses(layout: Layout, theta: np.ndarray) -> tuple[np.ndarray, None]:
             mass[layout.structure.body_index[addition.target]] += theta[place.coefficient]
         if isinstance(addition.effect, AttachedBody) and addition.taken_from:
             mass[layout.structure.body_index[addition.taken_from]] -= theta[place.coefficient]
-    return mass, None
+    return mass
 
 
 def _motion(link, record: Record, r: int, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
@@ -146,21 +145,53 @@ def _body_effect(layout, record, place: Place, theta, trajectory, loads, externa
     if isinstance(addition.effect, BodyForce):
         k, force = layout.structure.body_index[addition.target], addition.effect.force(record.time)
     elif isinstance(addition.effect, AttachedBody):
-        k, force = layout.structure.body_index[addition.host], -_smooth(trajectory.a[:, layout.attached[addition.target]])
+        k, force = layout.structure.body_index[addition.host], -trajectory.a[:, layout.attached[addition.target]]
     else:
         return
     loads[:, k] += c * force
     external_for(place.coefficient)[:, k] += force * inverse[k]
 
 
-SMOOTH = savgol_coeffs(11, 2)
-"""A measured inertia acts with its sensor's noise: a short local parabola takes most of that out, not the signal."""
+class Noise(NamedTuple):
+    """Of one sample of each output, and how it grows with parameters: through the masses whose inertia is measured."""
+
+    std: np.ndarray  # (q,) SI
+    growth: list[tuple[int, int, float]]  # output, parameter, d ln(std) / d parameter
 
 
-def _smooth(a: np.ndarray) -> np.ndarray:
-    half = len(SMOOTH) // 2
-    padded = np.concatenate([np.full(half, a[0]), a, np.full(half, a[-1])])
-    return np.convolve(padded, SMOOTH, "valid")
+def output_noise(layout: Layout, record: Record, theta: np.ndarray, samples: int = 1) -> Noise:
+    """An attached body's inertia is felt with the noise of its channel: var_q = sigma_q^2 + (m / M)^2 sigma_a^2 s.
+
+    s = 1, or less for means over some samples of an output that a delay of a fraction f of the period smooths:
+    1 - 2 f (1 - f) / samples. In noise that is as large as what residuals leave (`mix`), a sensor's is contained.
+    """
+    variance, growth = record.noise**2, []
+    places = [place for place in layout.places if isinstance(place.addition.effect, AttachedBody)]
+    if record.mix is not None or not places:
+        return Noise(record.noise, growth)
+    mass, index = _masses(layout, theta), layout.structure.body_index
+    period = float(np.median(np.diff(record.time[record.at])))
+    for place in places:
+        addition = place.addition
+        host, sigma = index[addition.host], record.signals[addition.target].noise
+        share = float(theta[place.coefficient]) / mass[host]
+        slope = (1.0 + (share if addition.taken_from == addition.host else 0.0)) / mass[host]
+        for q, output in enumerate(layout.outputs):
+            if output.body != host:
+                continue
+            delay, parameter = _delay(layout, theta, output.channel)
+            f = delay / period % 1.0
+            smoothed = 1.0 - 2.0 * f * (1.0 - f) / samples
+            variance[q] += (share * sigma) ** 2 * smoothed
+            growth.append((q, place.coefficient, share * slope * sigma**2 * smoothed))
+            if parameter >= 0:
+                growth.append((q, parameter, (share * sigma) ** 2 * (2.0 * f - 1.0) / (samples * period)))
+    return Noise(np.sqrt(variance), [(q, p, g / variance[q]) for q, p, g in growth])
+
+
+def _delay(layout: Layout, theta: np.ndarray, channel: str) -> tuple[float, int]:
+    found = distortion(layout, theta, channel)
+    return found.delay, found.parameters[1]
 
 
 def _sampling(layout: Layout, record: Record, theta: np.ndarray) -> tuple[Sampling, list[int]]:
@@ -175,7 +206,7 @@ def _sampling(layout: Layout, record: Record, theta: np.ndarray) -> tuple[Sampli
         lag=np.floor(lag).astype(int),
         fraction=lag - np.floor(lag),
         bin=record.bin,
-        weight=record.valid / record.noise,
+        weight=record.valid / output_noise(layout, record, theta, record.per_bin).std,
     )
     return sampling, parameters
 
@@ -191,6 +222,7 @@ def predicted(layout: Layout, record: Record, r: int, theta: np.ndarray, rows: n
         true = (1.0 - fraction) * _later(rows[:, output.body], whole)
         if fraction:
             true += fraction * _later(rows[:, output.body], whole + 1)
+            true[whole : whole + 1] = 0.0  # still an instant before the impact
         offset = layout.offsets[r] + q
         outputs[:, q] = (1.0 + d.gain) * true + d.offset + theta[offset]
         by.append((q, offset, np.ones(len(true))))
@@ -201,6 +233,7 @@ def predicted(layout: Layout, record: Record, r: int, theta: np.ndarray, rows: n
             by.append((q, jump, np.ones(len(true))))
         if delay >= 0:
             slope = (_later(rows[:, output.body], whole + 1) - _later(rows[:, output.body], whole)) / step
+            slope[whole : whole + 1] *= fraction == 0.0
             by.append((q, delay, (1.0 + d.gain) * slope))
     return outputs, by
 
@@ -212,7 +245,7 @@ def _later(values: np.ndarray, steps: int) -> np.ndarray:
 def balance_of(layout: Layout, record: Record, theta: np.ndarray) -> np.ndarray:
     """(g,) N: the force on a fixed body that the measured accelerations of all masses call for, - sum of M a."""
     motion = measured_motion(layout, record, 0, np.where(np.arange(layout.size) < layout.common, theta, 0.0))
-    mass, _ = _masses(layout, theta)
+    mass = _masses(layout, theta)
     force = np.zeros(len(record.time))
     for k, body in enumerate(layout.structure.bodies):
         if body.free:
@@ -223,5 +256,3 @@ def balance_of(layout: Layout, record: Record, theta: np.ndarray) -> np.ndarray:
         if isinstance(place.addition.effect, BodyForce):
             force += theta[place.coefficient] * place.addition.effect.force(record.time)
     return force
-
-

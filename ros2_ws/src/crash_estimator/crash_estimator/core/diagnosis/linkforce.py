@@ -77,7 +77,9 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
         parameters += [place.coefficient, *place.shapes.values()]
         columns += [static * h[0], *(static * c * d for d in h[1:])]
     force, kx, kp, weight = static * factor, kx * factor, kp * factor, weight * factor[:, None]
-    columns = [column * factor if p in (link.constant, link.slope) else column for p, column in zip(parameters, columns)]
+    columns = [
+        column * factor if p in (link.constant, link.slope) else column for p, column in zip(parameters, columns)
+    ]
 
     parallel, px, pv = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
     damping = theta[link.damping] if link.damping is not None else link.known_damping

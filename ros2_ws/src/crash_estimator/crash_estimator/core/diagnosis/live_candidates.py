@@ -63,9 +63,7 @@ def try_some(
     return LiveState(state.updates + 1, leaders, gains, turns, screened), now + _rest(screened, now, gains)
 
 
-def _screened(
-    state: LiveState, scales: Scales, effects: Mapping[str, Effect], before: Model
-) -> tuple[Screened, ...]:
+def _screened(state: LiveState, scales: Scales, effects: Mapping[str, Effect], before: Model) -> tuple[Screened, ...]:
     """Along the measured motion, where a strong effect is seen as it is, or the model's own, where a weak one is."""
     additions = candidates(scales.structure, scales, effects, before.additions)
     by_fit = before.left.whiteness.white or state.updates % 4 == 2

@@ -25,12 +25,15 @@ class Model(NamedTuple):
 
 
 def fit_model(
-    structure: Structure, records: Sequence[Record], scales: Scales, additions: Sequence[Addition], start: Fit | None = None
+    structure: Structure, records: Sequence[Record], scales: Scales, additions: Sequence[Addition],
+    start: Fit | None = None,
 ) -> Model:  # fmt: skip
     """Fit, then let the curves fold where they were found to bend sharply, and fit again."""
     layout = make_layout(structure, records, scales, additions)
     found = fit(layout, records, (start.theta, start.trajectories) if start else None)
-    roughness = {link.name: adapted_roughness(link.curve, found.theta) for link in layout.links if link.curve is not None}
+    roughness = {
+        link.name: adapted_roughness(link.curve, found.theta) for link in layout.links if link.curve is not None
+    }
     if roughness and np.isfinite(found.cost):
         layout = make_layout(structure, records, scales, additions, roughness)
         found = fit(layout, records, (found.theta, found.trajectories))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .layout import Layout
-from .linearise import Equations, linearise, predicted
+from .linearise import Equations, linearise, output_noise, predicted
 from .motion import measured_motion
 from .propagate import FREE, propagate
 from .records import Record
@@ -33,16 +33,23 @@ class Normal(NamedTuple):
     vector: np.ndarray  # (p,)
     cost: float  # sum of squares of the whitened residual
     samples: int
+    grown: float  # 2 sum of ln(noise with that of measured inertias / noise): what louder noise costs in likelihood
 
 
 @may_diverge
 def normal_equations(
-    layout: Layout, records: Sequence[Record], theta, trajectories, follow: bool = True, switched=(), stage: Stage = FREE_RUN
+    layout: Layout,
+    records: Sequence[Record],
+    theta,
+    trajectories,
+    follow: bool = True,
+    switched=(),
+    stage: Stage = FREE_RUN,
 ) -> tuple[Normal, list[Equations]]:
     """follow=False leaves out that the motion changes with the forces: the equation error on the given motion."""
     size = layout.size + len(switched)
     matrix, vector = np.zeros((size, size)), np.zeros(size)
-    cost, samples, every = 0.0, 0, []
+    cost, samples, grown, every = 0.0, 0, 0.0, []
     for r, (record, trajectory) in enumerate(zip(records, trajectories)):
         target = measured_motion(layout, record, r, theta) if stage.pull else None
         equations = linearise(layout, record, r, theta, trajectory, switched, stage.pull, target, stage.blur)
@@ -54,10 +61,20 @@ def normal_equations(
         c = equations.columns
         matrix[np.ix_(c, c)] += flat.T @ flat
         vector[c] += flat.T @ residual.ravel()
+        noise, filled = output_noise(layout, record, theta, record.per_bin), _filled(record)
+        for q, parameter, slope in noise.growth:
+            # a noisy regressor draws its coefficient towards zero, by as much as the noise it brings grows with it
+            vector[parameter] += slope * filled[q]
+        grown += 2.0 * float(filled @ np.log(noise.std / record.noise))
         cost += float(residual.ravel() @ residual.ravel())
         samples += residual.size
         every.append(equations)
-    return Normal(matrix, vector, cost, samples), every
+    return Normal(matrix, vector, cost, samples, grown), every
+
+
+def _filled(record: Record) -> np.ndarray:
+    """(q,) bins with a valid sample."""
+    return np.array([np.count_nonzero(_binned(record, valid)) for valid in record.valid.T])
 
 
 def _outputs(layout, record, r, theta, trajectory, equations, target) -> tuple[np.ndarray, np.ndarray]:

@@ -24,7 +24,9 @@ class Linear(NamedTuple):
     dt: np.ndarray  # (g,) s to the instant from the one before; 0 at the first
     ends: np.ndarray  # (l, 2) bodies that the link's force acts on
     crush_ends: np.ndarray  # (l, 2) bodies whose distance is its crush; -1: measured, it does not move
-    inverse_mass: np.ndarray  # (b,) 1/kg for a free body, 1 for a fixed one (its row is the force on it), 0 for a driven one
+    inverse_mass: (
+        np.ndarray
+    )  # (b,) 1/kg for a free body, 1 for a fixed one (its row is the force on it), 0 for a driven one
     kind: np.ndarray  # (b,) FREE, DRIVEN or FIXED
     kx: np.ndarray  # (g, l) dF/dX
     kv: np.ndarray  # (g, l) dF/dV
@@ -33,7 +35,9 @@ class Linear(NamedTuple):
     knot: np.ndarray  # (g, l, 2) columns of the two curve knots in use; -1: none
     weight: np.ndarray  # (g, l, 2) dF/d(force at that knot)
     pull: float  # 1/s, observer that pulls the free bodies towards the measured motion: -pull^2 xi - 2 pull xi'
-    extra: np.ndarray  # (g, b, 1 + pe) external acceleration (free, driven) or force (fixed) of column 0 and the last pe
+    extra: (
+        np.ndarray
+    )  # (g, b, 1 + pe) external acceleration (free, driven) or force (fixed) of column 0 and the last pe
 
 
 class Sampling(NamedTuple):
@@ -209,6 +213,8 @@ def _sample(sampling, t, row, out):
             at = t + sampling.lag[q] + part
             if share == 0.0 or at >= len(sampling.bin) or sampling.bin[at] < 0:
                 continue
+            if t == 0 and part == 0 and sampling.fraction[q] > 0.0:
+                continue  # that sample still shows an instant before the impact
             scale = share * sampling.gain[q] * sampling.weight[at, q]
             target, source = out[sampling.bin[at], q], row[sampling.body[q]]
             for j in range(len(source)):

@@ -1,4 +1,4 @@
-"""A recording made ready for the fit: samples after the impact on an even grid, and what is known of each sensor's noise.
+"""A recording made ready for the fit: samples after the impact on an even grid, and what is known of their noise.
 
 The simulation runs on a grid that has every sample on it, at no more than `LONGEST_STEP`. Each channel that a body or
 force is measured by is one output; outputs are compared in means over short bins of samples, since what a
@@ -61,6 +61,10 @@ class Record(NamedTuple):
     bins: int
     mix: np.ndarray | None = None  # (q, q) whitens outputs that are in units of their noise; None: they are independent
 
+    @property
+    def per_bin(self) -> int:
+        return round(len(self.at) / self.bins)
+
 
 def outputs_of(structure: Structure) -> tuple[Output, ...]:
     """Every channel of every free body, and the measured force of every fixed one."""
@@ -76,7 +80,9 @@ def make_record(structure: Structure, recording: Recording) -> Record:
     kinematics = Kinematics(structure, recording.test)  # checks the channels, knows the initial motion
     after = recording.time_ns >= 0
     if np.count_nonzero(after) < FEWEST_SAMPLES:
-        raise ModelError(f"test {recording.test.id} has {np.count_nonzero(after)} samples after the impact, too few to fit")
+        raise ModelError(
+            f"test {recording.test.id} has {np.count_nonzero(after)} samples after the impact, too few to fit"
+        )
     sample_time = recording.time_ns[after] * 1e-9
     time, at = _grid(sample_time)
     outputs = outputs_of(structure)

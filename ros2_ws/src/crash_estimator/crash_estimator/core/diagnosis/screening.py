@@ -83,7 +83,9 @@ def screen(
     half = np.where(low == 0.0, np.log(2.0) + log_ndtr(b / np.sqrt(precision)), 0.0)
     free = np.where(low == 0.0, b / precision, found)
     gain = b * free - 0.5 * precision * free**2 - 0.5 * np.log(precision * std**2) + half
-    ranked = [Screened(*row) for row in zip([*additive, *laws], gain.tolist(), found.tolist(), (precision**-0.5).tolist())]
+    ranked = [
+        Screened(*row) for row in zip([*additive, *laws], gain.tolist(), found.tolist(), (precision**-0.5).tolist())
+    ]
     return sorted(ranked, key=lambda one: -one.gain)
 
 

@@ -137,5 +137,3 @@ def one_round(records: Sequence[Record], scales: Scales, effects: Mapping[str, E
         before = fit_model(scales.structure, noisier, scales, model.additions)
         done = Round(before, try_candidates(noisier, scales, effects, before))
     return done
-
-

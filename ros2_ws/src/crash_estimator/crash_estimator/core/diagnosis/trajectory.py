@@ -52,7 +52,7 @@ def element_motion(structure: Structure, record: Record, trajectory: Trajectory,
 
 
 def measured_crush(record: Record, displacement: str, velocity: str | None) -> tuple[np.ndarray, np.ndarray]:
-    """(g,) crush and rate from measured channels; without a channel of its own the rate is the crush's smoothed slope."""
+    """(g,) crush and rate from measured channels; without its own channel the rate is the crush's smoothed slope."""
     signal = record.signals[displacement]
     crush = np.interp(record.time, signal.time, signal.values)
     if velocity:

@@ -30,6 +30,9 @@ LONG_LIST = 10
 MOST_HOSTS = 3
 """Bodies that an unmodelled one is tried on, with a curve to each neighbour."""
 
+AS_GIVEN = 6.0
+"""Nats that a body whose mass the model's own contain must gain over one beside them."""
+
 SLOW = 3
 """Candidates that are then fitted on with more care."""
 
@@ -61,7 +64,9 @@ def try_candidates(
     """
     additions = candidates(scales.structure, scales, effects, model.additions)
     by_fit = screen(records, scales, model.additions, additions, model.roughness, model.fit)
-    by_motion = [] if model.left.whiteness.white else screen(records, scales, model.additions, additions, model.roughness)
+    by_motion = (
+        [] if model.left.whiteness.white else screen(records, scales, model.additions, additions, model.roughness)
+    )
     worth = [one for one in by_fit if one.gain > WORTH_FITTING]
     search = _Search(records, scales, model, by_fit)
     search.from_motion(shortlist(by_motion, SHORTLIST))
@@ -107,7 +112,7 @@ class _Search:
             self._fit(one.addition, one)
 
     def _touching(self, addition: Addition) -> None:
-        """What an unmodelled body pushes: the body that takes the rest of its balance may be any of those it may touch."""
+        """What an unmodelled body pushes: the rest of its balance may go to any of the bodies that it may touch."""
         hosts: dict[str, Addition] = {addition.host: addition}
         for one in self.screened:
             if one.addition.key == addition.key:
@@ -115,12 +120,17 @@ class _Search:
         for host in list(hosts.values())[:MOST_HOSTS]:
             for variant in touching(self.scales.structure, host):
                 self._fit(variant, None)
+        best = self.found[addition.key].addition
+        if best.taken_from:
+            self._fit(replace(best, taken_from=None), None)
 
     def slowly(self) -> None:
         """Fit the best ones on, with care for forces that jump."""
         for tried in [t for t in self.ranking() if t.fit][:SLOW]:
             start = tried.fit.theta, tried.fit.trajectories
-            self._note(tried.addition, fit(tried.fit.layout, self.records, start, refine=SLOWLY, most=2 * MOST_ITERATIONS))
+            self._note(
+                tried.addition, fit(tried.fit.layout, self.records, start, refine=SLOWLY, most=2 * MOST_ITERATIONS)
+            )
 
     def _fit(self, addition: Addition, screened: Screened | None) -> None:
         if (id(addition), screened is None) in self.done:
@@ -135,7 +145,11 @@ class _Search:
         self.least = min(self.least, found.cost)
         gain = found.evidence - self.model.fit.evidence
         before = self.found.get(addition.key)
-        if before is None or before.fit is None or gain > before.gain:
+        if (
+            before is None
+            or before.fit is None
+            or gain - _handicap(addition) > before.gain - _handicap(before.addition)
+        ):
             self.found[addition.key] = Tried(addition, gain, found, None)
 
     def _start(self, layout: Layout, addition: Addition, screened: Screened) -> tuple[np.ndarray, list[Trajectory]]:
@@ -161,6 +175,12 @@ class _Search:
         rest = sorted((t for t in self.found.values() if not t.fit), key=lambda t: -t.gain)
         least = max(fitted[-1].gain, 0.0) if fitted else np.inf
         return fitted + [t._replace(gain=min(t.gain, least)) for t in rest]
+
+
+def _handicap(addition: Addition) -> float:
+    """Nats. Without a measured force nothing tells a body beside the model's masses from one that they contain:
+    halving every force and mass leaves the motion as it is. Then the model's masses stand as they were given."""
+    return AS_GIVEN if addition.taken_from else 0.0
 
 
 def shortlist(screened: Sequence[Screened], length: int) -> list[Screened]:

@@ -14,12 +14,13 @@ from crash_replay.recording import Test
 
 from ..kinematics import initial_motion
 from ..structure import (
-    CONTACT_FREQUENCY, TYPICAL_CRUSH, TYPICAL_RATE, Action, Body, Coefficient, EffectSpec, Element, ModelError, Structure,
+    CONTACT_FREQUENCY, TYPICAL_CRUSH, TYPICAL_RATE, Action, Body, Coefficient, EffectSpec, Element, ModelError,
+    Structure,
 )  # fmt: skip
 from . import EFFECTS
 from .base import (
-    AttachedBody, BodyForce, BodyInertia, ChannelError, Effect, ElementForce, ElementMotion, Gap, PairSpring, StaticFactor,
-    UnloadingSlope,
+    AttachedBody, BodyForce, BodyInertia, ChannelError, Effect, ElementForce, ElementMotion, Gap, PairSpring,
+    StaticFactor, UnloadingSlope,
 )  # fmt: skip
 from .targets import checked
 
@@ -42,11 +43,16 @@ def applied(structure: Structure, test: Test, effects: Mapping[str, Effect] = EF
 
 
 def _kind(effect: Effect) -> type[Effect]:
-    return next(kind for kind in _APPLY if isinstance(effect, kind))
+    for kind in _APPLY:
+        if isinstance(effect, kind):
+            return kind
+    raise ModelError(
+        f"effect {effect.name} is of no kind that can be put to work: {', '.join(kind.__name__ for kind in _APPLY)}"
+    )
 
 
 def _shape_constants(structure: Structure, spec: EffectSpec, effect: Effect) -> dict[str, float]:
-    """Those given; for others the middle of where a diagnosis would start to search, unless that depends on the crush."""
+    """Those given; for others the middle of where a diagnosis starts to search, unless that depends on the crush."""
     found = dict(spec.shape)
     for name, shape in effect.shapes.items():
         if name not in found and shape.of_crush:
@@ -57,8 +63,8 @@ def _shape_constants(structure: Structure, spec: EffectSpec, effect: Effect) -> 
 
 def _to_be_given(structure: Structure, spec: EffectSpec, what: str) -> ModelError:
     return ModelError(
-        f"model {structure.name}: effect {spec.type} on {spec.target} needs {what}, which no estimator can follow sample "
-        "by sample: give it, or let `diagnose --apply` find it"
+        f"model {structure.name}: effect {spec.type} on {spec.target} needs {what}, which no estimator can follow "
+        "sample by sample: give it, or let `diagnose --apply` find it"
     )
 
 
@@ -68,14 +74,18 @@ def _coefficient(spec: EffectSpec, effect: Effect) -> Coefficient:
     return Coefficient(0.0, estimated=True, min=effect.low, max=effect.high, drift=0.0, shape="constant")
 
 
-def _with_action(structure: Structure, spec: EffectSpec, unit: str, kind: str, at: int, coefficient, scale, **more) -> Structure:
+def _with_action(
+    structure: Structure, spec: EffectSpec, unit: str, kind: str, at: int, coefficient, scale, **more
+) -> Structure:
     name = f"{spec.target}.{spec.type}"
     action = Action(name, unit, kind, at, coefficient, max(scale, abs(coefficient.value)), **more)
     return replace(structure, actions=(*structure.actions, action))
 
 
 def _with_element(structure: Structure, name: str, **changes) -> Structure:
-    return replace(structure, elements=tuple(replace(e, **changes) if e.name == name else e for e in structure.elements))
+    return replace(
+        structure, elements=tuple(replace(e, **changes) if e.name == name else e for e in structure.elements)
+    )
 
 
 def _element(structure: Structure, name: str) -> int:
@@ -83,15 +93,18 @@ def _element(structure: Structure, name: str) -> int:
 
 
 def _typical(structure: Structure, element: int) -> ElementMotion:
-    crush, rate = np.array([TYPICAL_CRUSH]), np.array([TYPICAL_RATE])
-    static = structure.reduced_mass(element) * CONTACT_FREQUENCY**2 * crush
-    return ElementMotion(np.zeros(1), crush, rate, crush, static)
+    """Beyond the typical crush as well: where a force that begins late, such as a stop's, is looked at."""
+    crush = TYPICAL_CRUSH * 2.0 ** np.arange(6)
+    rate = np.full_like(crush, TYPICAL_RATE)
+    static = structure.reduced_mass(element) * CONTACT_FREQUENCY**2 * np.full_like(crush, TYPICAL_CRUSH)
+    return ElementMotion(np.zeros_like(crush), crush, rate, crush, static)
 
 
 def _element_force(structure: Structure, test: Test, spec: EffectSpec, effect: ElementForce) -> Structure:
     k, force = _element(structure, spec.target), partial(effect.force, **spec.shape)
     typical = _typical(structure, k)
-    scale = ROUGHLY * float(typical.static[0]) / max(abs(float(force(typical)[0])), 1e-9)
+    moved = np.abs(force(typical))
+    scale = ROUGHLY * float(typical.static[0]) / float(moved[moved > 0.0][0] if moved.any() else 1.0)
     return _with_action(structure, spec, effect.unit, "element", k, _coefficient(spec, effect), scale, force=force)
 
 
@@ -145,8 +158,12 @@ def _body_inertia(structure: Structure, test: Test, spec: EffectSpec, effect: Bo
 def _heavier(structure: Structure, body: int, by: float) -> Structure:
     mass = structure.bodies[body].mass + by
     if mass <= 0.0:
-        raise ModelError(f"model {structure.name}: its effects leave body {structure.bodies[body].name} no mass: {mass:g} kg")
-    return replace(structure, bodies=tuple(replace(b, mass=mass) if k == body else b for k, b in enumerate(structure.bodies)))
+        raise ModelError(
+            f"model {structure.name}: its effects leave body {structure.bodies[body].name} no mass: {mass:g} kg"
+        )
+    return replace(
+        structure, bodies=tuple(replace(b, mass=mass) if k == body else b for k, b in enumerate(structure.bodies))
+    )
 
 
 def _body_force(structure: Structure, test: Test, spec: EffectSpec, effect: BodyForce) -> Structure:

@@ -104,7 +104,7 @@ class BodyForce(Effect):
 
 @dataclass(frozen=True)
 class AttachedBody(Effect):
-    """A body that the model has not got, moving as an unused acceleration channel shows; the coefficient is its mass."""
+    """A body that the model has not got, moving as an unused acceleration channel shows; the coefficient: its mass."""
 
 
 @dataclass(frozen=True)

@@ -22,5 +22,10 @@ def unstated(value: float, exponent: float) -> float:
 
 
 EFFECT = StaticFactor(
-    "rate_hardening", "m/s", {"exponent": Shape("", 0.7, 10.0, (1.0, 3.0))}, factor=factor, stated=stated, unstated=unstated
+    "rate_hardening",
+    "m/s",
+    {"exponent": Shape("", 0.7, 10.0, (1.0, 3.0))},
+    factor=factor,
+    stated=stated,
+    unstated=unstated,
 )

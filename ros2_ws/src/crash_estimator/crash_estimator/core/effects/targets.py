@@ -25,7 +25,7 @@ def key_of(effect: Effect) -> str:
 
 
 def possible_targets(structure: Structure, effect: Effect, test: Test | None = None) -> list[str] | None:
-    """All that an effect of this kind can act on; None: any channel that the model does not use, the test is unknown."""
+    """All that an effect of this kind can act on; None: any channel that the model does not use, of an unknown test."""
     match key_of(effect):
         case "element":
             return [element.name for element in structure.elements]
@@ -41,9 +41,7 @@ def possible_targets(structure: Structure, effect: Effect, test: Test | None = N
     return [c.name for c in test.channels if c.quantity == "acceleration" and c.name not in used]
 
 
-def checked(
-    structure: Structure, spec: EffectSpec, effects: Mapping[str, Effect], test: Test | None = None
-) -> Effect:
+def checked(structure: Structure, spec: EffectSpec, effects: Mapping[str, Effect], test: Test | None = None) -> Effect:
     """The effect that a model's entry means.
 
     Raises ModelError with one line where there is no such effect, or its target, shape constant or body is not one.
