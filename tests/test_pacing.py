@@ -5,6 +5,7 @@ from threading import Thread, Timer
 
 import numpy as np
 import pytest
+from helpers_waiting import PATIENCE
 
 from crash_replay.pacing import Pacing, SubscribersMissing
 from crash_replay.player import Mode, Player
@@ -68,10 +69,12 @@ def playing():
     yield start
     for pacing, thread in started:
         pacing.stopped = True
+        with pacing.changed:
+            pacing.changed.notify_all()  # it looks when it next wakes up
         thread.join()
 
 
-def wait_until(condition, timeout: float = 5.0) -> None:
+def wait_until(condition, timeout: float = PATIENCE) -> None:
     limit = time.monotonic() + timeout
     while not condition():
         assert time.monotonic() < limit, "waited in vain"
@@ -128,20 +131,27 @@ def test_what_cannot_be_sent_at_once_is_answered_in_time(playing, monkeypatch):
     wait_until(lambda: pacing.outlet.numbers() == list(range(7)))
 
 
-def test_the_state_is_reported_at_changes_and_in_between(playing):
+def test_the_state_is_reported_ten_times_a_second(playing):
     pacing = playing(pacing_of())
     pacing.start(paused=True)
     wait_until(lambda: (Mode.PAUSED, 0) in pacing.outlet.states)
-    count = len(pacing.outlet.states)
-    time.sleep(0.35)
-    assert 2 <= len(pacing.outlet.states) - count <= 5  # 10 a second
+    begin, count = time.monotonic(), len(pacing.outlet.states)
+    wait_until(lambda: len(pacing.outlet.states) >= count + 4)
+    assert time.monotonic() - begin > 0.25  # 0.3 to 0.4 s
+
+
+def test_a_change_of_the_state_is_reported_at_once(playing, monkeypatch):
+    monkeypatch.setattr("crash_replay.pacing.STATE_PERIOD", 3600.0)
+    pacing = playing(pacing_of())
+    pacing.start(paused=True)
+    wait_until(lambda: pacing.outlet.states[-1:] == [(Mode.PAUSED, 0)])
     pacing.send_at_once(Player.burst, 3)
-    wait_until(lambda: pacing.outlet.states[-1] == (Mode.PAUSED, 3), timeout=0.09)
+    wait_until(lambda: pacing.outlet.states[-1] == (Mode.PAUSED, 3))
 
 
 def test_the_block_follows_the_rate():
     pacing = pacing_of(period_ns=100_000, block=0)
-    assert pacing.block == 5
+    assert pacing.block == 25
     pacing.command(Player.set_rate, 0.1)
     assert pacing.block == 1
     assert pacing_of(period_ns=100_000, block=3).block == 3

@@ -247,16 +247,17 @@ def test_commands_leave_the_player_they_are_given_to_as_it_was():
     "period, rate, channels, block",
     [
         (1e-3, 1.0, 16, 1),
-        (1e-3, 2.0, 16, 1),  # 2000 messages a second
-        (1e-3, 2.1, 16, 2),
-        (1e-4, 1.0, 16, 5),
+        (1e-4, 0.1, 16, 1),  # 1000 messages a second
+        (1e-3, 1.1, 16, 3),
+        (1e-4, 1.0, 16, 25),  # 400 messages a second
+        (5e-5, 1.0, 16, 50),
         (1e-4, 0.01, 16, 1),
         (1e-4, 1000.0, 16, 477),  # 65 kB
         (1e-4, 1000.0, 1, 4062),
         (0.0, 1000.0, 1, 1),
     ],
 )
-def test_blocks_are_as_small_as_about_2000_messages_a_second_allow(period, rate, channels, block):
+def test_single_messages_up_to_1000_a_second_and_above_it_blocks(period, rate, channels, block):
     assert suitable_block(period, rate, channels) == block
 
 
@@ -273,3 +274,12 @@ def test_the_tally_knows_the_rate_and_the_worst_lateness():
     assert_allclose(tally.rate, 0.1 / 0.201)
     assert (tally.samples, tally.messages) == (10, 4)
     assert_allclose(tally.worst_lateness, 1e-3, rtol=1e-9)
+
+
+def test_a_loop_that_is_late_counts_its_lateness_once():
+    """20 passes of 10 ms, each taking 20 ms."""
+    tally, player = Tally(), Player(TEN, loop=True).resume(0.0)
+    for k in range(200):
+        player, batch = player.take(now := 0.002 * (k + 1))
+        tally.count(batch, TEN[batch.stop - 1].item(), now)
+    assert_allclose(tally.rate, 0.45, rtol=0.02)  # of 10 ms, 9 ms lie between samples

@@ -30,6 +30,19 @@ def test_it_has_room_for_so_many_messages_more_while_the_clock_is_kept():
         assert sent == min(limit, BYTES // 100)
 
 
+def test_a_publisher_that_holds_few_messages_gets_no_more_of_them():
+    """Where the user's quality of service asks for a short history, what exceeds it would be lost."""
+    for on_time in (True, False):
+        publisher = Publisher()
+        publisher.acknowledged = False
+        flow = Flow(lambda: [publisher], print, depth=10)
+        sent = 0
+        while flow.has_room(0.0, on_time):
+            flow.sent(1, 100)
+            sent += 1
+        assert 1 <= sent < 10
+
+
 def test_large_messages_count_by_their_bytes():
     publisher = Publisher()
     publisher.acknowledged = False

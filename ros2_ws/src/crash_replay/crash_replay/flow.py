@@ -5,9 +5,11 @@ from collections.abc import Callable, Sequence
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 
+from .qos import STREAM
+
 NOT_WAITING = Duration(seconds=0)
 ON_TIME = 4000
-"""Messages that may be on their way while the clock is kept: below the 5000 that a publisher holds."""
+"""Messages that may be on their way while the clock is kept: below the 5000 that a publisher holds by default."""
 LATE = 500
 """Messages that may be on their way when there is no clock to keep: enough to keep all of them busy."""
 BYTES = 250_000
@@ -23,8 +25,13 @@ class Flow:
     holds the publisher back when it is full, one that keeps the last n loses what it is too slow for.
     """
 
-    def __init__(self, publishers: Callable[[], Sequence[Publisher]], warn: Callable[[str], None]):
+    def __init__(
+        self, publishers: Callable[[], Sequence[Publisher]], warn: Callable[[str], None], depth: int = STREAM.depth
+    ):
+        """depth: messages that each publisher holds for those who have not got them yet."""
         self.publishers, self.warn = publishers, warn
+        most = max(1, depth * ON_TIME // STREAM.depth)
+        self.most = {True: min(ON_TIME, most), False: min(LATE, most)}  # by whether the clock is kept
         self.messages = self.bytes = 0  # since all was acknowledged
         self.waiting_since: float | None = None
 
@@ -39,7 +46,7 @@ class Flow:
 
     def has_room(self, now: float, on_time: bool) -> bool:
         """Whether more may be sent at the wall time `now`. Never waits: rclpy's own waiting stops all other threads."""
-        if self.messages < (ON_TIME if on_time else LATE) and self.bytes < BYTES:
+        if self.messages < self.most[on_time] and self.bytes < BYTES:
             return True
         if self.acknowledged():
             self._start_anew()

@@ -5,7 +5,7 @@ that dies, or does not answer for long, is gone on without, so that the replay n
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Set
 from threading import Condition
 from typing import NamedTuple
 
@@ -21,14 +21,18 @@ class Answered(NamedTuple):
     missed: int  # samples it did not get, in all
 
 
+Listeners = Mapping[str, Set[bytes]]
+"""Name -> the processes that listen under it, by what the middleware knows them by."""
+
+
 class Lockstep:
     """`expect` and `has_room` are of the thread that sends, `answer` comes from another."""
 
-    def __init__(self, listeners: Callable[[], set[str]], warn: Callable[[str], None], patience: float):
-        """listeners: names of those there are now; patience: s to wait for one that is there but does not answer."""
+    def __init__(self, listeners: Callable[[], Listeners], warn: Callable[[str], None], patience: float):
+        """listeners: those there are now; patience: s to wait for one that is there but does not answer."""
         self.listeners, self.warn, self.patience = listeners, warn, patience
         self.changed = Condition()
-        self.known: set[str] = set()
+        self.known: Listeners = {}
         self.dropped: set[str] = set()  # there, but silent
         self.owing: set[str] = set()  # those whose answer to the last samples is still to come
         self.answers: dict[str, Answered] = {}
@@ -39,22 +43,25 @@ class Lockstep:
         """Look who is there now: who came owes answers from the next samples on, who went owes none."""
         there = self.listeners()
         with self.changed:
-            gone = self.known - there
+            gone = self.known.keys() - there.keys()
+            again = {name for name in self.known.keys() & there.keys() if there[name] - self.known[name]}
             self.known = there
-            self.owing -= gone
-            self.dropped &= there
+            self.owing -= gone | again
+            self.dropped -= gone | again
         for name in sorted(gone):
             self.warn(f"{name} has gone, the replay no longer waits for it")
+        for name in sorted(again):
+            self.warn(f"{name} has been started again, the replay no longer waits for what it owed before")
 
     def told(self) -> dict[str, Answered]:
         """What each listener that is there has told last."""
         with self.changed:
-            return {name: self.answers[name] for name in sorted(self.known & self.answers.keys())}
+            return {name: self.answers[name] for name in sorted(self.known.keys() & self.answers.keys())}
 
     def expect(self, run: int, number: int) -> None:
         """Samples up to `number` are about to be sent."""
         with self.changed:
-            self.last, self.owing = (run, number), self.known - self.dropped
+            self.last, self.owing = (run, number), self.known.keys() - self.dropped
         self.since = time.perf_counter()
         self.look_at = self.since + LOOK_AFTER
 

@@ -16,6 +16,8 @@ import numpy as np
 
 LOWEST_RATE, HIGHEST_RATE = 0.001, 1000.0
 SECOND = 1_000_000_000
+SINGLES, BLOCKS = 1000.0, 400.0
+"""Messages a second: at most of one sample each, and about so many of several."""
 
 
 class CommandError(ValueError):
@@ -185,12 +187,14 @@ def check_rate(rate: float) -> None:
 
 
 def suitable_block(period: float, rate: float, channels: int) -> int:
-    """Samples in a message, so few that single messages carry them where they can.
+    """Samples in a message: one where single messages carry them.
 
-    period in s between samples. About 2000 messages a second leave room for what their receivers do with
-    each; a message stays below 64 kB, which the transport takes in one piece.
+    period in s between samples. A message costs its receivers the same however many samples it holds. Two cores
+    carry 1000 a second with several estimators, diagnosis and viewer; what needs blocks goes in so few that other
+    work on the machine does not make it late. A message stays below 64 kB, which the transport takes in one piece.
     """
-    wanted = np.ceil(rate / (2000.0 * period) - 1e-6) if period > 0 else 1
+    per_second = rate / period if period > 0 else 0.0
+    wanted = np.ceil(per_second / BLOCKS - 1e-6) if per_second > SINGLES * (1 + 1e-6) else 1
     return int(max(1, min(wanted, 65_000 // (8 * (channels + 1)))))
 
 
@@ -213,9 +217,11 @@ class Tally:
             self.previous = None
             return
         self.worst_lateness = max(self.worst_lateness, wall - batch.due)
-        if self.previous is None or self.previous[0] != batch.anchor:
+        if self.previous is None:
             self.previous = (batch.anchor, batch.anchor)
-        _, last = self.previous
+        anchor, last = self.previous
+        if anchor != batch.anchor:  # a pass that begins late begins when the last message went out
+            last = Anchor(max(last.wall, batch.anchor.wall), batch.anchor.time_ns)
         self.played += (last_time_ns - last.time_ns) / SECOND
         self.took += wall - last.wall
         self.previous = (batch.anchor, Anchor(wall, last_time_ns))

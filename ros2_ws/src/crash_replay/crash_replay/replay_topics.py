@@ -5,10 +5,11 @@ import time
 from crash_msgs.msg import Answer, ReplayState, Samples, TestInfo
 from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosgraph_msgs.msg import Clock
 
 from .flow import NOT_WAITING, Flow
-from .lockstep import Answered, Lockstep
+from .lockstep import Answered, Listeners, Lockstep
 from .player import SECOND, Batch, Player, Tally
 from .qos import LATCHED, SAID, STREAM
 from .recording import Recording
@@ -17,6 +18,11 @@ from .ros_messages import channel_to_msg, channel_type, samples_to_msg, stamp, t
 UNNAMED = "_NODE_NAME_UNKNOWN_"
 """As rcl calls the node of a publisher that was found before its node was."""
 OVERRIDABLE = QoSOverridingOptions.with_default_policies()
+
+
+def process_of(endpoint: TopicEndpointInfo) -> bytes:
+    """The participant that a publisher or subscription is of: the first 12 bytes of its GUID (RTPS 2.2, 8.2.4.2)."""
+    return bytes(endpoint.endpoint_gid[:12])
 
 
 class ReplayTopics:
@@ -32,7 +38,9 @@ class ReplayTopics:
             node.create_publisher(channel_type(c), f"channels/{c.name}", STREAM, qos_overriding_options=OVERRIDABLE)
             for c in recording.test.channels
         ]
-        self.flow = Flow(self._flowing, node.get_logger().warning)
+        overrides = node.get_parameters_by_prefix("qos_overrides")
+        depths = [parameter.value for name, parameter in overrides.items() if name.endswith(".depth")]
+        self.flow = Flow(self._flowing, node.get_logger().warning, min([STREAM.depth, *filter(None, depths)]))
         self.look = self.flow.look
         self.acknowledged = 0  # samples
         self.lockstep = None
@@ -64,10 +72,17 @@ class ReplayTopics:
         else:
             time.sleep(0.0005)
 
-    def _listeners(self) -> set[str]:
-        """Full names of the nodes that publish answers, but of those just found whose names are still to come."""
-        found = self.node.get_publishers_info_by_topic(self.answers.topic_name)
-        return {f"{i.node_namespace.rstrip('/')}/{i.node_name}" for i in found if i.node_name != UNNAMED}
+    def _listeners(self) -> Listeners:
+        """Full names of the nodes that publish answers, but of those just found whose names are still to come.
+
+        Only those whose subscription to the samples is found, too: else what is sent next would not reach them.
+        """
+        hearing = {process_of(info) for info in self.node.get_subscriptions_info_by_topic(self.samples.topic_name)}
+        found: dict[str, set[bytes]] = {}
+        for info in self.node.get_publishers_info_by_topic(self.answers.topic_name):
+            if info.node_name != UNNAMED and process_of(info) in hearing:
+                found.setdefault(f"{info.node_namespace.rstrip('/')}/{info.node_name}", set()).add(process_of(info))
+        return found
 
     def _on_answer(self, message: Answer) -> None:
         self.lockstep.answer(message.node, Answered(message.run, message.number, message.missed))

@@ -19,8 +19,10 @@ from .speed_live import Effort, Live
 from .speed_row import HEAD, Row
 from .speed_steps import steps
 
-QUICK = Effort(singles=0.1, blocks=0.5, rounds=1, hold=1.0, probe=0.5, rates=(2e3,), latency=200, jitter=0.3)
-PARTS = ("steps", "growth", "throughput", "latency", "jitter", "viewer", "real_time")
+QUICK = Effort(
+    singles=0.1, blocks=0.5, rounds=1, hold=1.0, probe=0.5, rates=(2e3,), latency=200, jitter=0.3, lockstep=2
+)
+PARTS = ("steps", "growth", "throughput", "latency", "jitter", "viewer", "real_time", "lockstep")
 
 ABOUT = """\
 # Speed

@@ -55,7 +55,7 @@ class Listener(Node):
         for name in names:
             for topic, kind in (("parameters", Parameters), ("residuals", Residuals)):
                 take = lambda message, name=name, topic=topic: self._take(name, topic, message)  # noqa: E731
-                self.create_subscription(kind, f"{name}/{topic}", take, STREAM)
+                self.create_subscription(kind, f"{name}/{topic}", take, EVERY_SAMPLE)
 
     def _take(self, name: str, topic: str, message: Parameters | Residuals) -> None:
         self.last = time.perf_counter()

@@ -1,7 +1,8 @@
 """Estimates of consecutive samples as columns, the form in which they travel: from the compiled recursion's rows as
 they are, or from `Estimate`s."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ class Columns(NamedTuple):
 
     number: int
     time_ns: np.ndarray  # (k,) int64
-    of: dict[str, np.ndarray]  # field of the messages -> (k, width)
+    of: Mapping[str, np.ndarray]  # field of the messages -> (k, width)
     events: Sequence[tuple[int, Event]]  # row, event
 
     def __len__(self) -> int:
@@ -78,9 +79,8 @@ def _follow_compiled(
 ) -> tuple[CompiledState, Columns]:
     before = state.last_row
     state, table = estimator.follow(state, rows.time_ns, rows.values)
-    columns = estimator.columns
-    value = table[:, columns["parameters"]]
-    if not np.isfinite(value).all():
+    value = table[:, estimator.columns["parameters"]]
+    if not isfinite(value[-1].sum()):  # what is not finite once stays so
         good = int(np.argmin(np.isfinite(value).all(axis=1)))
         done = _columns(estimator, rows.first(good), table[:good], before) if good else None
         number, time_ns = rows.number + good, int(rows.time_ns[good])
@@ -88,28 +88,27 @@ def _follow_compiled(
     return state, _columns(estimator, rows, table, before)
 
 
-def _columns(estimator: CompiledEstimator, rows: Rows, table: np.ndarray, before: np.ndarray | None) -> Columns:
-    columns = estimator.columns
-    of = {name: table[:, columns[name]] for name in (*FIELDS, "std", "innovation_std")}
-    of["value"] = table[:, columns["parameters"]]
-    of["status"], of["state"] = of["status"].astype(np.uint8), of["state"].astype(np.uint8)
+def _columns(estimator: CompiledEstimator, rows: Rows, table: np.ndarray, before: np.ndarray) -> Columns:
     events = [
         (k, event)
-        for k in _eventful(estimator, table, before)
+        for k in np.flatnonzero(table[:, estimator.columns["news"]]).tolist()
         for event in estimator.events(table[k], table[k - 1] if k else before, int(rows.time_ns[k]))
     ]
-    return Columns(rows.number, rows.time_ns, of, events)
+    return Columns(rows.number, rows.time_ns, Parts(table, estimator.columns), events)
 
 
-def _eventful(estimator: CompiledEstimator, table: np.ndarray, before: np.ndarray | None) -> list[int]:
-    """Rows that may have something to tell: to ask each would take longer than the estimate."""
-    if before is None:
-        return list(range(len(table)))
-    columns = estimator.columns
-    told = np.isnan(table[:, columns["measured"]]).any(axis=1) | (table[:, columns["rewinds"]][:, 0] > 0.0)
-    for place in (columns["state"], columns["status"]):
-        now = table[:, place]
-        told[0] |= (now[0] != before[place]).any()
-        if len(table) > 1:
-            told[1:] |= (now[1:] != now[:-1]).any(axis=1)
-    return np.flatnonzero(told).tolist()
+class Parts(Mapping):
+    """The messages' fields, cut out of the rows of output when they are asked for: mostly some are not."""
+
+    def __init__(self, table: np.ndarray, places: dict[str, slice]):
+        self.table, self.places = table, places
+
+    def __getitem__(self, field: str) -> np.ndarray:
+        part = self.table[:, self.places["parameters" if field == "value" else field]]
+        return part.astype(np.uint8) if field in ("status", "state") else part
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*FIELDS, "value", "std", "innovation_std"))
+
+    def __len__(self) -> int:
+        return len(FIELDS) + 3

@@ -1,9 +1,12 @@
 """What `estimator` publishes."""
 
+import time
+
 from builtin_interfaces.msg import Time
 from crash_msgs.msg import Answer, EstimatorState, Event, Forces, Parameters, Residuals
 from rclpy.node import Node
 
+from crash_replay.flow import Flow
 from crash_replay.qos import LATCHED, STREAM
 from crash_replay.ros_messages import stamp_ns
 
@@ -21,6 +24,7 @@ class EstimatorTopics:
         self.events = node.create_publisher(Event, "~/events", STREAM)
         self.state = node.create_publisher(EstimatorState, "~/state", LATCHED)
         self.answers = node.create_publisher(Answer, "answers", LATCHED)  # a replay that finds it late gets the last
+        self.flow = Flow(lambda: (self.parameters, self.residuals, self.forces), node.get_logger().warning)
         self.messages: EstimateMessages | None = None
         self.time_zero = 0  # stamp of the impact, ns
 
@@ -29,11 +33,14 @@ class EstimatorTopics:
         self.messages, self.time_zero = EstimateMessages(description, revision), stamp_ns(time_zero)
 
     def estimates(self, run: int, columns: Columns, stamp: Time) -> None:
-        """stamp: of the first of the samples."""
+        """stamp: of the first of the samples. Waits while those who keep all have not taken what was said before."""
+        while not self.flow.has_room(time.perf_counter(), on_time=True):
+            time.sleep(0.0005)
         self.parameters.publish(self.messages.parameters(stamp, run, columns))
         self.residuals.publish(self.messages.residuals(stamp, run, columns))
         if self.forces.get_subscription_count():
             self.forces.publish(self.messages.forces(stamp, run, columns))
+        self.flow.sent(1, 0)
         for event in self.messages.events(stamp, run, columns):
             self.events.publish(event)
 

@@ -39,6 +39,9 @@ SETTLED = 0.3
 class ViewerNode(Node):
     def __init__(self) -> None:
         super().__init__("viewer")
+        # On a busy machine the estimators go first, the picture comes later: this holds for all threads made from here
+        # on, Rerun's too, but not for the middleware's, whose acknowledgements the estimators may wait for.
+        os.nice(10)
         say = self.get_logger().info
         names = self._declared("estimators", [""], "names of estimators; empty: all there are")
         self.estimators = [name for name in names if name]
@@ -49,7 +52,6 @@ class ViewerNode(Node):
         wants_window = self._declared("open", True, "open the native viewer where there is a display")
         self.exits = self._declared("exit_when_finished", False, "end with the replay")
         sinks = Sinks(port, rrd, memory)
-        os.nice(10)  # on a busy machine the estimators go first, the picture comes later
         known = cache(partial(structure_named, [path for path in models if path]))
         warn = self.get_logger().warning
         self.recorder = Recorder(sinks, tuple(self.estimators), say=warn, structure_of=known)

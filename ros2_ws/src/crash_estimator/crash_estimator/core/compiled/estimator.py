@@ -11,14 +11,14 @@ from ..estimator import Estimator
 from ..structure import Structure
 from .follow import follow
 from .layout import length, row_fields, slices, state_fields
-from .plan import make_method_plan, make_plan, make_size
+from .plan import flat, make_method_plan, make_plan, make_size
 
 
 class CompiledState(NamedTuple):
     """Everything the recursion remembers after a sample."""
 
     memory: np.ndarray  # flat, see layout.state_fields
-    last_row: np.ndarray | None  # of the last sample, to tell what has changed; None before the first
+    last_row: np.ndarray  # of the last sample, to tell what has changed
 
 
 class CompiledEstimator:
@@ -31,7 +31,7 @@ class CompiledEstimator:
         self.method = method
         self.plan = make_plan(readable.kinematics, readable.contact, readable.regressor, method.settings)
         self.size = make_size(self.plan, method)
-        self.method_plan = make_method_plan(method)
+        self._settings = flat(self.size, make_method_plan(method), self.plan)
         self._estimated = np.ix_(self.plan.slot >= 0, self.plan.slot >= 0)
         self._state_length = length(state_fields(self.size))
         self._row_length = length(row_fields(self.size))
@@ -44,24 +44,26 @@ class CompiledEstimator:
         memory[fields["displacement"]] = plan.initial_displacement
         memory[fields["velocity"]] = plan.initial_velocity
         memory[fields["contact"]] = ElementState.APART
-        memory[fields["theta"]] = plan.initial
         offsets = np.zeros(self.size.offsets)  # their variance is known at the first update
+        memory[fields["theta"]] = np.concatenate([plan.initial, offsets])
         memory[fields["covariance"]] = np.diag(np.concatenate([plan.std**2, offsets])).ravel()
         memory[fields["noise"]] = np.nan
         memory[fields["information"]] = np.diag(1.0 / plan.std**2).ravel()
         memory[fields["carried"]] = np.diag(plan.std**2).ravel()
         memory[fields["gamma"]] = 1.0
-        return CompiledState(memory, None)
+        last_row = np.zeros(self._row_length)
+        last_row[self.columns["state"]] = ElementState.APART
+        return CompiledState(memory, last_row)
 
     def follow(self, state: CompiledState, times_ns: np.ndarray, values: np.ndarray) -> tuple[CompiledState, np.ndarray]:
         """Fold a block of samples in -> the new state and one row of output a sample; `state` is left as it was.
 
         times_ns (k,) int64 ns since the impact; values (k, channels) SI. Rows (k, ...) hold `columns`.
         """
-        memory = state.memory.copy()
+        after = CompiledState(state.memory.copy(), state.last_row.copy())
         rows = np.empty((len(times_ns), self._row_length))
-        follow(self.plan, self.method_plan, self.size, memory, times_ns, values, rows)
-        return CompiledState(memory, rows[-1].copy() if len(rows) else state.last_row), rows  # not the whole block
+        follow(*self._settings, *after, times_ns, values, rows)
+        return after, rows
 
     def step(self, state: CompiledState, sample: Sample) -> tuple[CompiledState, Estimate]:
         """Fold one sample in; `state` is left as it was."""
@@ -69,12 +71,14 @@ class CompiledEstimator:
         after, rows = self.follow(state, times, sample.values.reshape(1, -1))
         return after, self.estimate(sample.number, sample.time_ns, rows[0], state.last_row)
 
-    def estimate(self, number: int, time_ns: int, row: np.ndarray, before: np.ndarray | None) -> Estimate:
+    def estimate(self, number: int, time_ns: int, row: np.ndarray, before: np.ndarray) -> Estimate:
         """A row of output as an Estimate; `before` is the row before it, for the events."""
-        p, q = self.size.estimated, self.size.equations
-        covariance = np.zeros((self.size.parameters,) * 2)
-        covariance[self._estimated] = row[self.columns["covariance"]].reshape(p, p)
-        part = {name: row[place] for name, place in self.columns.items()}
+        p, q, columns = self.size.estimated, self.size.equations, self.columns
+        covariance = row[columns["covariance"]].reshape(p, p)
+        if p < self.size.parameters:
+            of_estimated, covariance = covariance, np.zeros((self.size.parameters,) * 2)
+            covariance[self._estimated] = of_estimated
+        part = {name: row[place] for name, place in columns.items()}
         return Estimate(
             number=number,
             time_ns=time_ns,
@@ -95,15 +99,12 @@ class CompiledEstimator:
             displacement=part["displacement"],
             velocity=part["velocity"],
             acceleration=part["acceleration"],
-            events=self.events(row, before, time_ns),
+            events=self.events(row, before, time_ns) if part["news"] else (),
         )
 
-    def events(self, row: np.ndarray, before: np.ndarray | None, time_ns: int) -> tuple[Event, ...]:
+    def events(self, row: np.ndarray, before: np.ndarray, time_ns: int) -> tuple[Event, ...]:
         """What has changed since the row before: contact, clamps, rewinds, dropouts."""
         columns, names = self.columns, self.description
-        if before is None:
-            before = np.zeros(self._row_length)
-            before[columns["state"]] = ElementState.APART
         found = []
         for k in np.flatnonzero(row[columns["state"]] != before[columns["state"]]):
             kind, crush = ElementState(int(row[columns["state"]][k])).name.lower(), float(row[columns["crush"]][k])

@@ -7,23 +7,29 @@ from ..estimate import ParameterStatus
 from .kalman import kalman_step
 from .motion import APART, UNLOADING, move, regress, touch
 from .rls import rls_step
-from .views import row_views, state_views
+from .views import method_of, plan_views, row_views, size_of, state_views
 
 ESTIMATED, KNOWN, UNLOADS, SEPARATE, CLAMPED, _ = (float(status) for status in ParameterStatus)
 
 
 @njit(cache=True)
-def follow(plan, method, n, state, times_ns, values, rows):
-    """Fold (k, c) values at (k,) times through the method; `state` is changed in place, (k, row) `rows` are filled."""
-    s = state_views(state, n)
+def follow(whole, others, state, last_row, times_ns, values, rows):
+    """Fold (k, c) values at (k,) times through the method; (k, row) `rows` are filled.
+
+    `state` and `last_row`, the row before them, are changed in place.
+    """
+    n, method = size_of(whole), method_of(others)
+    plan, s = plan_views(whole, others, n), state_views(state, n)
     p, q, e = n.estimated, n.equations, n.elements
     per_offset = np.zeros((e, n.offsets))
     clean, bodies = np.empty(n.channels), np.empty(n.bodies)
     lever, shift, per_unit = np.empty(e), np.empty(e), np.empty(n.parameters)
     known, gradient, learnt, target = np.empty(q), np.empty((q, p + n.offsets)), np.empty(q), np.empty(q)
-    active, walk, clamped, before = np.empty(p), np.empty(p), np.empty(p), np.empty(p)
+    active, walk = np.ones(p + n.offsets), np.empty(p)
+    clamped, before = np.empty(p + n.offsets), np.empty(p + n.offsets)
+    latest = np.empty(len(last_row))
+    row, previous = row_views(latest, n), row_views(last_row, n)
     for t in range(len(times_ns)):
-        row = row_views(rows[t], n)
         time = times_ns[t] * 1e-9
         dt = move(plan, s, row, times_ns[t], values[t], clean, bodies)
         touch(plan, s, row, time, lever, shift)
@@ -39,13 +45,17 @@ def follow(plan, method, n, state, times_ns, values, rows):
             else:
                 rls_step(plan, method, s, row, dt, known, gradient, active, walk, learnt, target, clamped)
         else:
+            gradient[:, p:] = 0.0  # nothing is expected of the zero offsets' errors without an update
             row.innovation_covariance[:, :] = 0.0
             for i in range(q):
                 row.innovation_covariance[i, i] = learnt[i] if learnt[i] == learnt[i] else 0.0
         _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped)
+        row.news[0] = _news(row, previous)
+        last_row[:] = latest
+        rows[t] = latest
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped):
     """Write the estimate: what the parameters now predict, and how sure that is."""
     p, q = len(s.theta), len(known)
@@ -71,7 +81,8 @@ def _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped):
         for j in range(p):
             predicted += gradient[i, j] * s.theta[j]
             expected += gradient[i, j] * before[j]
-            for h in range(p):
+        for j in range(n.estimated):
+            for h in range(n.estimated):
                 spread += gradient[i, j] * s.covariance[j, h] * gradient[i, h]
         row.predicted[i] = predicted
         row.innovation[i] = row.measured[i] - expected
@@ -89,3 +100,16 @@ def _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped):
                 row.force_std[k] += per_unit[j] * s.covariance[slot, plan.slot[h]] * per_unit[h]
     for k in range(len(shift)):
         row.force_std[k] = np.sqrt(max(row.force_std[k], 0.0))
+
+
+@njit(cache=True, inline="always")
+def _news(row, previous):
+    """1.0 where something is not as it was at the sample before."""
+    news = row.rewinds[0]
+    for k in range(len(row.state)):
+        news += row.state[k] != previous.state[k]
+    for j in range(len(row.status)):
+        news += row.status[j] != previous.status[j]
+    for i in range(len(row.measured)):
+        news += np.isnan(row.measured[i]) != np.isnan(previous.measured[i])
+    return min(news, 1.0)

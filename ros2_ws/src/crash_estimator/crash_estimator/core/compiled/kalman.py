@@ -13,13 +13,11 @@ from ..kinematics import FEWEST, RECORD
 
 @njit(cache=True)
 def kalman_update(theta, covariance, noise, gradient, target, active, lower, upper, constrained, clamped):
-    """Update theta (p,) and the covariance (p + b, p + b) in place by one sample of q equations.
+    """Update theta (p,) and its covariance (p, p) in place by one sample of q equations.
 
-    The b rows at the end of the covariance are considered, not estimated. noise (q,) variances; gradient (q, p + b);
-    target (q,) measured minus known, NaN where not measured; active (p,) 1.0 where estimated; clamped (p,) is set to
-    1.0 where a parameter is held at its bound.
+    noise (q,) variances; gradient (q, p); target (q,) measured minus known, NaN where not measured; active (p,) 1.0 where
+    estimated; lower, upper: bounds of the first of them; clamped (p,) is set to 1.0 where one is held at its bound.
     """
-    p = len(theta)
     start = theta.copy()
     prior = covariance.copy()
     free = active.copy()
@@ -34,7 +32,7 @@ def kalman_update(theta, covariance, noise, gradient, target, active, lower, upp
                 _one_equation(theta, covariance, noise[i], gradient[i], target[i], free, gain, spread)
         again = False
         if constrained:
-            for j in range(p):
+            for j in range(len(lower)):
                 if free[j] == 1.0 and (theta[j] < lower[j] or theta[j] > upper[j]):
                     start[j] = min(max(theta[j], lower[j]), upper[j])
                     free[j] = 0.0
@@ -44,22 +42,22 @@ def kalman_update(theta, covariance, noise, gradient, target, active, lower, upp
             break
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _one_equation(theta, covariance, r, psi, target, free, gain, spread):
-    p, n = len(theta), len(covariance)
+    n = len(theta)
     error, s = target, r
     for j in range(n):
         total = 0.0
         for k in range(n):
-            if k >= p or free[k] == 1.0:
+            if free[k] == 1.0:
                 total += covariance[j, k] * psi[k]
         spread[j] = total
     for j in range(n):
-        if j >= p or free[j] == 1.0:
+        if free[j] == 1.0:
             s += psi[j] * spread[j]
-    for j in range(p):
+    for j in range(n):
         error -= psi[j] * theta[j]
-    for j in range(p):
+    for j in range(n):
         gain[j] = free[j] * spread[j] / s
         theta[j] += gain[j] * error
     # Joseph's form for one equation: T = (I - L psi) P, then T (I - L psi)' + L r L', with psi P = spread'
@@ -71,11 +69,12 @@ def _one_equation(theta, covariance, r, psi, target, free, gain, spread):
             covariance[k, j] = value
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def kalman_step(plan, method, n, s, row, dt, known, gradient, active, walk, learnt, target, clamped):
     """Random walk, update, and adaptation of R2 to what the model cannot follow."""
     p, q = len(s.theta), len(known)
-    for j in range(p):
+    spread = np.empty(len(s.covariance))
+    for j in range(n.estimated):
         size = max(abs(s.theta[j]), SMALLEST_SHARE * plan.scale[j])
         s.covariance[j, j] += walk[j] * size**2
     if n.offsets and np.isnan(s.noise[0]):
@@ -88,12 +87,15 @@ def kalman_step(plan, method, n, s, row, dt, known, gradient, active, walk, lear
             s.noise[i] = learnt[i] if learnt[i] == learnt[i] else 1.0
         target[i] = row.measured[i] - known[i]
     for i in range(q):
+        for j in range(len(spread)):
+            spread[j] = 0.0
+            for h in range(len(spread)):
+                spread[j] += s.covariance[j, h] * gradient[i, h]
         for k in range(q):
             total = s.noise[i] if i == k else 0.0
-            for j in range(len(s.covariance)):
-                for h in range(len(s.covariance)):
-                    total += gradient[i, j] * s.covariance[j, h] * gradient[k, h]
-            row.innovation_covariance[i, k] = total
+            for j in range(len(spread)):
+                total += gradient[k, j] * spread[j]
+            row.innovation_covariance[k, i] = total
     before = s.theta.copy()
     kalman_update(
         s.theta, s.covariance, s.noise, gradient, target, active, plan.lower, plan.upper, method.constrained, clamped

@@ -17,7 +17,7 @@ class Size(NamedTuple):
     elements: int
     parameters: int  # known ones included
     estimated: int
-    offsets: int  # errors of zero offsets that are considered beside them: one for each body, or none
+    offsets: int  # errors of zero offsets that are estimated beside them: one for each body, or none
     equations: int
     window: int  # m, samples that MRLS may use again
 
@@ -39,8 +39,8 @@ def state_fields(size: Size) -> dict[str, tuple[int, ...]]:
         "peak": (e,),
         "peak_rate": (e,),
         "contact": (e,),  # ElementState
-        "theta": (p,),  # the estimated parameters only, here and below
-        "covariance": (p + n, p + n),  # with the offsets' errors at its end
+        "theta": (p + n,),  # the estimated parameters only, here and below, and the errors of the zero offsets
+        "covariance": (p + n, p + n),
         "noise": (q,),  # R2 of the Kalman filter, slow residual variance of RLS; NaN until the first update
         "information": (p, p),  # RLS from here on
         "carried": (p, p),
@@ -81,6 +81,7 @@ def row_fields(size: Size) -> dict[str, tuple[int, ...]]:
         "covariance": (p, p),
         "innovation_covariance": (q, q),
         "rewinds": (1,),  # passes of MRLS over its window at this sample
+        "news": (1,),  # 1: it has an event to tell of, perhaps
     }
 
 

@@ -10,7 +10,7 @@ from ..regression import QUIETEST, SHORTEST_CRUSH
 
 LOADING, UNLOADING, APART = (float(state) for state in ElementState)
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def move(plan, s, row, time_ns, raw, values, bodies_now):
     """Integrate the bodies' motion and the elements' crush by one sample -> dt in s (0 before the impact).
 
@@ -75,7 +75,7 @@ def move(plan, s, row, time_ns, raw, values, bodies_now):
     return dt
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def touch(plan, s, row, time, lever, shift):
     """Loading, unloading or apart; the springs' force is K lever + shift."""
     for k in range(len(lever)):
@@ -103,7 +103,7 @@ def touch(plan, s, row, time, lever, shift):
         s.contact[k] = row.state[k] = state
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def regress(plan, s, row, n, dt, time, lever, shift, per_unit, per_offset, known, gradient, active, walk, noise):
     """Fill the regression of this sample -> whether it says anything about an estimated parameter.
 
@@ -161,7 +161,7 @@ def regress(plan, s, row, n, dt, time, lever, shift, per_unit, per_offset, known
     return excited
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def value_of(value, slot, theta, j):
     """The parameter's known or latest value. (It takes arrays: to hand on all of a plan takes a microsecond.)"""
     return value[j] if slot[j] < 0 else theta[slot[j]]

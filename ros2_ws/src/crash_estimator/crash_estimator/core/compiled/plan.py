@@ -15,26 +15,27 @@ from .layout import Size
 
 class Plan(NamedTuple):
     """Who is measured by what, and who pushes whom. c channels, b bodies, e elements, q equations;
-    all parameters for those of the model, p for those that are estimated."""
+    all parameters for those of the model, p for those that are estimated. The whole numbers come first."""
 
     first_channel: np.ndarray  # (b + 1,) accelerometers of body k: body_channels[first_channel[k] : first_channel[k + 1]]
-    body_channels: np.ndarray
-    has_offset: np.ndarray  # (c,) bool
-    initial_displacement: np.ndarray  # (b,)
-    initial_velocity: np.ndarray  # (b,)
+    has_offset: np.ndarray  # (c,) 1: yes
     ends: np.ndarray  # (e, 2)
     crush_channel: np.ndarray  # (e,) -1: integrated
     rate_channel: np.ndarray  # (e,) -1: integrated, or derived from a measured crush
     equation_body: np.ndarray  # (q,) -1: a measured force
     force_channel: np.ndarray  # (q,) -1: a balance
-    share: np.ndarray  # (q, e)
-    compression_only: np.ndarray  # (e,) bool
-    unloading: np.ndarray  # (e,) 0: elastic
+    compression_only: np.ndarray  # (e,) 1: yes
     element: np.ndarray  # (all,)
-    is_stiffness: np.ndarray  # (all,) bool
+    is_stiffness: np.ndarray  # (all,) 1: yes
     slot: np.ndarray  # (all,) place among the estimated ones, -1: known
-    value: np.ndarray  # (all,) known or initial
     stiffness: np.ndarray  # (e,) which of all is the element's stiffness
+    damping: np.ndarray  # (e,) which of all is the element's damping
+    body_channels: np.ndarray  # as many as there are
+    initial_displacement: np.ndarray  # (b,)
+    initial_velocity: np.ndarray  # (b,)
+    share: np.ndarray  # (q, e)
+    unloading: np.ndarray  # (e,) 0: elastic
+    value: np.ndarray  # (all,) known or initial
     given_noise: np.ndarray  # (q,) variance; NaN: from before the impact
     drift_squared: np.ndarray  # (p,)
     initial: np.ndarray  # (p,)
@@ -44,7 +45,6 @@ class Plan(NamedTuple):
     scale: np.ndarray  # (p,)
     own_offset: np.ndarray  # (q, b) 1 where the equation is that body's balance
     crush_of_body: np.ndarray  # (e, b) d(crush) / d(displacement)
-    damping: np.ndarray  # (e,) which of all is the element's damping
 
 
 class MethodPlan(NamedTuple):
@@ -70,23 +70,24 @@ def make_plan(kinematics: Kinematics, contact: Contact, regressor: Regressor, se
     per_body = [columns for _, columns in kinematics.accelerometers]
     return Plan(
         first_channel=np.cumsum([0, *[len(columns) for columns in per_body]]),
-        body_channels=np.array([column for columns in per_body for column in columns], dtype=np.int64),
         has_offset=kinematics.offsets,
-        initial_displacement=kinematics.initial_displacement,
-        initial_velocity=kinematics.initial_velocity,
         ends=structure.ends,
         crush_channel=_placed(kinematics.crush_channels, e),
         rate_channel=_placed(kinematics.rate_channels, e),
         equation_body=_placed(kinematics.balances, q),
         force_channel=_placed(kinematics.force_channels, q),
-        share=regressor.share,
         compression_only=contact.compression_only,
-        unloading=contact.unloading,
         element=regressor.element,
         is_stiffness=regressor.is_stiffness,
         slot=np.where(estimated, np.cumsum(estimated) - 1, -1),
-        value=settings.initial,
         stiffness=regressor.stiffness_index,
+        damping=regressor.damping_index,
+        body_channels=np.array([column for columns in per_body for column in columns], dtype=np.int64),
+        initial_displacement=kinematics.initial_displacement,
+        initial_velocity=kinematics.initial_velocity,
+        share=regressor.share,
+        unloading=contact.unloading,
+        value=settings.initial,
         given_noise=regressor.noise,
         drift_squared=regressor.drift_squared[estimated],
         initial=settings.initial[estimated],
@@ -96,8 +97,17 @@ def make_plan(kinematics: Kinematics, contact: Contact, regressor: Regressor, se
         scale=settings.scale[estimated],
         own_offset=regressor.own_offset,
         crush_of_body=regressor.crush_of_body,
-        damping=regressor.damping_index,
     )
+
+
+def flat(size: Size, method: MethodPlan, plan: Plan) -> tuple[np.ndarray, np.ndarray]:
+    """All of it as whole numbers and others: two arrays are handed on in a fifth of the time of so many.
+
+    `views` has the way back.
+    """
+    first = Plan._fields.index("initial_displacement")
+    whole, others = ([np.ravel(part) for part in parts] for parts in (plan[:first], plan[first:]))
+    return np.concatenate([size, *whole]).astype(np.int64), np.concatenate([method, *others]).astype(np.float64)
 
 
 def make_method_plan(method: Kalman | Rls) -> MethodPlan:

@@ -4,40 +4,47 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True)
-def invert(matrix, out):
-    """Inverse of a symmetric positive matrix, after scaling its diagonal to 1 (N/m beside N s/m)."""
+@njit(cache=True, error_model="numpy")
+def invert(matrix, keep, out):
+    """Inverse of the kept rows and columns of a symmetric positive matrix, zero elsewhere; not finite if singular.
+
+    Its diagonal is scaled to 1 (N/m beside N s/m); then Gauss-Jordan, which needs no pivoting for such a matrix.
+    """
     n = len(matrix)
-    scale = np.empty(n)
+    scale = np.zeros(n)
     for j in range(n):
-        scale[j] = 1.0 / np.sqrt(matrix[j, j])
-    scaled = np.empty((n, n))
-    for j in range(n):
-        for k in range(n):
-            scaled[j, k] = matrix[j, k] * scale[j] * scale[k]
-    inverse = np.linalg.inv(scaled)
+        if keep[j]:
+            scale[j] = 1.0 / np.sqrt(matrix[j, j])
     for j in range(n):
         for k in range(n):
-            out[j, k] = inverse[j, k] * scale[j] * scale[k]
+            out[j, k] = matrix[j, k] * scale[j] * scale[k] if keep[j] and keep[k] else 0.0
+    for pivot in range(n):
+        if not keep[pivot]:
+            continue
+        inverse = 1.0 / out[pivot, pivot]
+        out[pivot, pivot] = 1.0
+        for k in range(n):
+            out[pivot, k] *= inverse
+        for j in range(n):
+            if j != pivot and keep[j]:
+                factor = out[j, pivot]
+                out[j, pivot] = 0.0
+                for k in range(n):
+                    out[j, k] -= factor * out[pivot, k]
+    for j in range(n):
+        for k in range(n):
+            out[j, k] *= scale[j] * scale[k]
 
 
 @njit(cache=True)
-def _submatrix_inverse(matrix, keep):
-    """Inverse of the rows and columns that are kept, zero elsewhere."""
-    n = len(matrix)
-    index = np.flatnonzero(keep)
-    small, inverse = np.empty((len(index), len(index))), np.empty((len(index), len(index)))
-    out = np.zeros((n, n))
-    if not len(index):
-        return out
-    for a in range(len(index)):
-        for b in range(len(index)):
-            small[a, b] = matrix[index[a], index[b]]
-    invert(small, inverse)
-    for a in range(len(index)):
-        for b in range(len(index)):
-            out[index[a], index[b]] = inverse[a, b]
-    return out
+def multiply(a, b, out):
+    """out = a b: for a few rows, a loop is done before the linear algebra library is called."""
+    for j in range(a.shape[0]):
+        for k in range(b.shape[1]):
+            total = 0.0
+            for i in range(a.shape[1]):
+                total += a[j, i] * b[i, k]
+            out[j, k] = total
 
 
 @njit(cache=True)
@@ -64,13 +71,14 @@ def correct(plan, method, s, gradient, target, active, learnt, dt, multiplier, e
             floored[i, k] = s.error_covariance[i, k]
         if learnt[i] == learnt[i]:
             floored[i, i] += method.noise_floor * learnt[i]
-    weight = _submatrix_inverse(floored, valid)
+    weight, weighted = np.empty((q, q)), np.empty((q, p))
+    invert(floored, valid, weight)
     excited = np.zeros(p)
     for j in range(p):
         for i in range(q):
             if active[j] and valid[i] and gradient[i, j] != 0.0:
                 excited[j] = 1.0
-    weighted = weight @ gradient
+    multiply(weight, gradient, weighted)
     root = np.sqrt(forgetting)
     for j in range(p):
         fade_j = root if excited[j] else 1.0
@@ -83,7 +91,7 @@ def correct(plan, method, s, gradient, target, active, learnt, dt, multiplier, e
     free = excited.copy()
     clamped[:] = 0.0
     start = s.theta.copy()
-    residual = np.empty(q)
+    residual, pull, inverse = np.empty(q), np.empty(p), np.empty((p, p))
     while True:
         for i in range(q):
             residual[i] = 0.0
@@ -91,9 +99,13 @@ def correct(plan, method, s, gradient, target, active, learnt, dt, multiplier, e
                 residual[i] = target[i]
                 for j in range(p):
                     residual[i] -= gradient[i, j] * start[j]
-        pull = weighted.T @ residual
-        inverse = _submatrix_inverse(s.information, free)
-        gain[:, :] = multiplier * (inverse @ weighted.T)
+        invert(s.information, free, inverse)
+        multiply(inverse, weighted.T, gain)
+        gain *= multiplier
+        for j in range(p):
+            pull[j] = 0.0
+            for i in range(q):
+                pull[j] += weighted[i, j] * residual[i]
         again = False
         for j in range(p):
             step = 0.0
@@ -113,10 +125,17 @@ def correct(plan, method, s, gradient, target, active, learnt, dt, multiplier, e
                 again = True
         if not again:
             break
-    lessen = np.eye(p) - gain @ gradient
-    s.carried[:, :] = lessen @ s.carried @ lessen.T
+    lessen, once = np.empty((p, p)), np.empty((p, p))
+    multiply(gain, gradient, lessen)
+    for j in range(p):
+        for k in range(p):
+            lessen[j, k] = (1.0 if j == k else 0.0) - lessen[j, k]
+    multiply(lessen, s.carried, once)
+    multiply(once, lessen.T, s.carried)
+    before = np.empty((p, q))
     for t in range(len(s.window_dt)):
-        s.window_influence[t] = lessen @ s.window_influence[t]
+        before[:, :] = s.window_influence[t]
+        multiply(lessen, before, s.window_influence[t])
 
 
 @njit(cache=True)
@@ -233,7 +252,7 @@ def remember(s, gradient, target, learnt, active, dt, error, gain, m):
     s.clock[1] = kept + 1
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def rls_step(plan, method, s, row, dt, known, gradient, active, walk, learnt, target, clamped):
     """Correction, rewinds (MRLS), and the slow residual variance that sets the error limits."""
     p, q, m = len(s.theta), len(known), len(s.window_dt)

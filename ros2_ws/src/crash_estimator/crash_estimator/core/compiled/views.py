@@ -5,6 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from .layout import Size
+from .plan import MethodPlan, Plan
+
 
 class StateViews(NamedTuple):
     clock: np.ndarray
@@ -58,9 +61,10 @@ class RowViews(NamedTuple):
     covariance: np.ndarray
     innovation_covariance: np.ndarray
     rewinds: np.ndarray
+    news: np.ndarray
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def cuts(sizes):
     """Where each part starts, and the end of the last."""
     k = np.zeros(len(sizes) + 1, dtype=np.int64)
@@ -69,12 +73,12 @@ def cuts(sizes):
     return k
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def state_views(s, n):
     c, b, e, q, m = n.channels, n.bodies, n.elements, n.equations, n.window
     p = n.estimated
     w = n.estimated + n.offsets
-    k = cuts((2, c, c, b, q, b, b, b, e, e, e, e, e, p, w * w, q, p * p, p * p, q * q, 1, m * q * p, m * q, m * q, m * p, m, m * q, m * p * q, m * q))
+    k = cuts((2, c, c, b, q, b, b, b, e, e, e, e, e, w, w * w, q, p * p, p * p, q * q, 1, m * q * p, m * q, m * q, m * p, m, m * q, m * p * q, m * q))
     return StateViews(
         s[k[0] : k[1]],  # clock
         s[k[1] : k[2]],  # count
@@ -107,10 +111,10 @@ def state_views(s, n):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def row_views(r, n):
     a, b, e, p, q = n.parameters, n.bodies, n.elements, n.estimated, n.equations
-    k = cuts((a, a, a, q, q, q, q, q, q, e, e, e, e, e, b, b, b, p * p, q * q, 1))
+    k = cuts((a, a, a, q, q, q, q, q, q, e, e, e, e, e, b, b, b, p * p, q * q, 1, 1))
     return RowViews(
         r[k[0] : k[1]],  # parameters
         r[k[1] : k[2]],  # std
@@ -132,4 +136,54 @@ def row_views(r, n):
         r[k[17] : k[18]].reshape((p, p)),  # covariance
         r[k[18] : k[19]].reshape((q, q)),  # innovation_covariance
         r[k[19] : k[20]],  # rewinds
+        r[k[20] : k[21]],  # news
+    )
+
+
+@njit(cache=True, inline="always")
+def size_of(whole):
+    return Size(whole[0], whole[1], whole[2], whole[3], whole[4], whole[5], whole[6], whole[7])
+
+
+@njit(cache=True, inline="always")
+def method_of(others):
+    m = others
+    return MethodPlan(m[0] != 0.0, m[1] != 0.0, m[2], m[3], m[4], m[5], m[6], m[7], int(m[8]), m[9])
+
+
+@njit(cache=True, inline="always")
+def plan_views(whole, others, n):
+    i, x = whole[8:], others[10:]
+    a, b, e, p, q = n.parameters, n.bodies, n.elements, n.estimated, n.equations
+    k = cuts((b + 1, n.channels, 2 * e, e, e, q, q, e, a, a, a, e, e))
+    h = cuts((b, b, q * e, e, a, q, p, p, p, p, p, p, q * b, e * b))
+    return Plan(
+        i[k[0] : k[1]],  # first_channel
+        i[k[1] : k[2]],  # has_offset
+        i[k[2] : k[3]].reshape((e, 2)),  # ends
+        i[k[3] : k[4]],  # crush_channel
+        i[k[4] : k[5]],  # rate_channel
+        i[k[5] : k[6]],  # equation_body
+        i[k[6] : k[7]],  # force_channel
+        i[k[7] : k[8]],  # compression_only
+        i[k[8] : k[9]],  # element
+        i[k[9] : k[10]],  # is_stiffness
+        i[k[10] : k[11]],  # slot
+        i[k[11] : k[12]],  # stiffness
+        i[k[12] : k[13]],  # damping
+        i[k[13] :],  # body_channels
+        x[h[0] : h[1]],  # initial_displacement
+        x[h[1] : h[2]],  # initial_velocity
+        x[h[2] : h[3]].reshape((q, e)),  # share
+        x[h[3] : h[4]],  # unloading
+        x[h[4] : h[5]],  # value
+        x[h[5] : h[6]],  # given_noise
+        x[h[6] : h[7]],  # drift_squared
+        x[h[7] : h[8]],  # initial
+        x[h[8] : h[9]],  # std
+        x[h[9] : h[10]],  # lower
+        x[h[10] : h[11]],  # upper
+        x[h[11] : h[12]],  # scale
+        x[h[12] : h[13]].reshape((q, b)),  # own_offset
+        x[h[13] : h[14]].reshape((e, b)),  # crush_of_body
     )
