@@ -1,33 +1,21 @@
 """Every command in the README is run here as it stands; `make test` is the one that runs this."""
 
 import json
-import os
 import re
 import shlex
 import subprocess
-from pathlib import Path
 
+import numpy as np
 import pytest
+from helpers_readme import COMMANDS, README, ROOT, environment, needs_data
+from numpy.testing import assert_allclose
 
-ROOT = Path(__file__).parent.parent
-README = (ROOT / "README.md").read_text()
-COMMANDS = [line for block in re.findall(r"```sh\n(.*?)```", README, re.S) for line in block.splitlines() if line]
-LISTENING = [c for c in COMMANDS if any(node in c for node in ("crash_estimator viewer", "crash_estimator estimator", "crash_replay record"))]
+NODES = ("crash_estimator viewer", "crash_estimator estimator", "crash_replay record")
+LISTENING = [c for c in COMMANDS if any(node in c for node in NODES)]
 REPLAY = [c for c in COMMANDS if "crash_replay replay" in c]
 THREE = [c for c in COMMANDS if "hidden_effect" in c and "--effects" not in c]
-ALONE = [c for c in COMMANDS if c not in ("make test", *LISTENING, *REPLAY, *THREE)]
-
-
-def environment(domain: int) -> dict[str, str]:
-    """Of a new user without a display, on a ROS domain of the test's own."""
-    kept = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", "MAKEFLAGS", "MAKELEVEL")}
-    return kept | {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-
-
-def needs_data(command: str) -> None:
-    for word in re.findall(r"\.\./shared/data/\S+", command):
-        if not (ROOT / word).exists():
-            pytest.skip(f"{word} is not beside the project")
+MAKE = [c for c in COMMANDS if c.startswith("make ")]  # test_readme_demo, and this
+ALONE = [c for c in COMMANDS if c not in (*MAKE, *LISTENING, *REPLAY, *THREE)]
 
 
 def test_the_first_two_commands_do_everything():
@@ -43,7 +31,7 @@ def test_a_command_runs_as_it_stands(command):
     if "synthesize" in command:  # does not replace what is there
         (ROOT / "out" / "mine.mcap").unlink(missing_ok=True)
     done = subprocess.run(
-        shlex.split(command), cwd=ROOT, env=environment(71), capture_output=True, text=True, timeout=240
+        shlex.split(command), cwd=ROOT, env=environment(), capture_output=True, text=True, timeout=240
     )
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     assert "Traceback" not in done.stderr
@@ -56,14 +44,15 @@ def test_the_nodes_find_each_other(tmp_path):
         file.unlink(missing_ok=True)
         file.parent.mkdir(exist_ok=True)
     logs = [open(tmp_path / f"{k}.log", "w+") for k in range(3)]
+    together = environment()
     nodes = [
-        subprocess.Popen(shlex.split(c), cwd=ROOT, env=environment(72), stdout=log, stderr=log)
+        subprocess.Popen(shlex.split(c), cwd=ROOT, env=together, stdout=log, stderr=log)
         for c, log in zip(LISTENING, logs)
     ]
     try:
         replay = subprocess.run(
             [*shlex.split(REPLAY[0]), "-p", "wait_timeout:=120.0"],
-            cwd=ROOT, env=environment(72), capture_output=True, text=True, timeout=200,
+            cwd=ROOT, env=together, capture_output=True, text=True, timeout=200,
         )  # fmt: skip
         assert replay.returncode == 0, replay.stdout + replay.stderr
         assert "1201 samples sent" in replay.stdout
@@ -91,7 +80,7 @@ def test_the_effect_that_is_shown_is_the_file_and_stands_in_the_ranking():
     (command,) = [c for c in COMMANDS if "--effects" in c]
     found = ROOT / "out/own.json"
     if not found.exists():  # made by the command's own test, above
-        subprocess.run(shlex.split(command), cwd=ROOT, check=True, capture_output=True, env=environment(71))
+        subprocess.run(shlex.split(command), cwd=ROOT, check=True, capture_output=True, env=environment())
     ranking = json.loads(found.read_text())["ranking"]
     names = {(one["effect"], one["target"]): one for one in ranking}
     assert ("position_damping", "rib_spine") in names, "offered on the elements of the model"
@@ -99,18 +88,21 @@ def test_the_effect_that_is_shown_is_the_file_and_stands_in_the_ranking():
 
 
 def test_three_commands_lead_from_a_bag_to_a_lower_error():
-    """What the commands of the section print: the same errors, then what is missing, then smaller ones."""
-    assert [c.split()[2] for c in THREE] == ["estimate", "diagnose", "estimate"]
+    """What is missing and the error without and with it, as the README shows; that nothing else is; parameters."""
+    assert [c.split()[2] for c in THREE] == ["diagnose", "diagnose", "estimate"]
     said = [
-        subprocess.run(shlex.split(c), cwd=ROOT, check=True, capture_output=True, text=True, env=environment(71)).stdout
+        subprocess.run(shlex.split(c), cwd=ROOT, check=True, capture_output=True, text=True, env=environment()).stdout
         for c in THREE
     ]
-    assert said[1].startswith("effect missing: coulomb_friction on rib_spine")
-    before, after = (_spread(text) for text in (said[0], said[2]))
-    assert all(after[body] < 0.8 * before[body] for body in ("rib", "spine"))
+    assert said[0].startswith("effect missing: coulomb_friction on rib_spine")
+    before, after, floor = _errors(said[0])
+    assert (after < 1.1 * floor).all() and (after < 0.5 * before).all()
+    assert_allclose(_errors(README), (before, after, floor), rtol=0.02)  # what it shows is what is printed
+    assert said[1].startswith("adequate")
+    assert "rib_spine.coulomb_friction" in said[2]
 
 
-def _spread(text: str) -> dict[str, float]:
-    """Standard deviation of each equation's error, in g."""
-    rows = re.findall(r"^(\w+) +g +\S+ +\S+ +\S+ +(\S+) +\S+%$", text, re.M)
-    return {name: float(value) for name, value in rows}
+def _errors(text: str) -> np.ndarray:
+    """(3, 4) RMS of the error in g as given, with the friction, and of noise: over all, and of each channel."""
+    row = r"^(?:as given|\+ coulomb_friction on rib_spine|noise floor)" + 4 * r" +(\d+\.\d+)" + r"\b"
+    return np.array(re.findall(row, text, re.M), float)

@@ -2,54 +2,65 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+from scipy.constants import g as G
+
 from .core.diagnosis.answer import Ranked
 from .core.diagnosis.diagnosis import Diagnosis
 from .core.diagnosis.misfit import MisfitWindow
-from .tables import table
+from .core.diagnosis.model import Model
+from .core.diagnosis.trying import GAIN
+from .tables import READABLE, table
 
 SHOWN = 8
 
 
 def diagnosis_tables(found: Diagnosis) -> str:
     """All of them, in the order of the work: compare, learn, add, watch."""
+    adequate = found.verdict == "adequate"
     parts = (
-        misfit_table(found.misfit, "misfit of the model as given"),
+        "" if adequate else misfit_table(found.misfit, "where it fails, as given"),
         ranking_table(found.ranking),
         steps_table(found),
         revisions_table(found),
-        misfit_table(found.misfit_after, "misfit left") if found.steps else "",
+        misfit_table(found.misfit_after, "where it still fails") if found.steps and found.verdict == "unexplained" else "",
     )
     return "\n\n".join(part for part in parts if part)
 
 
 def misfit_table(windows: Sequence[MisfitWindow], title: str) -> str:
-    """The worst windows in which a residual leaves its band, in order of time."""
+    """The worst windows in which a residual leaves its band, in order of time; a force over the free bodies' mass."""
     worst = sorted(windows, key=lambda window: -window.rms * (window.end - window.start) ** 0.5)[:SHOWN]
     rows = [
         (
-            window.body, window.state, f"{window.start * 1e3:.1f}", f"{window.end * 1e3:.1f}", f"{window.measured:.4g}",
-            f"{window.predicted:.4g}", f"{window.rms:.3g}", window.recording,
+            window.body, window.state, f"{window.start * 1e3:.1f}", f"{window.end * 1e3:.1f}",
+            f"{window.measured / G:.3f}", f"{window.predicted / G:.3f}", f"{window.rms / G:.3g}", window.recording,
         )
         for window in windows
         if window in worst
     ]  # fmt: skip
-    head = (title, "state", "from ms", "to ms", "measured m/s^2", "predicted m/s^2", "RMS m/s^2", "recording")
+    head = (title, "state", "from ms", "to ms", "measured g", "predicted g", "RMS g", "recording")
     more = f"\n... and {len(windows) - len(worst)} smaller ones" if len(windows) > len(worst) else ""
     return table(head, rows) + more if rows else ""
 
 
 def ranking_table(ranking: Sequence[Ranked]) -> str:
-    """The best candidates of the first round; "?": screened only, its evidence is an estimate."""
-    rows = [_row(ranked) for ranked in ranking[:SHOWN]]
+    """The best candidates of the first round that gain anything."""
+    shown = [ranked for ranked in ranking[:SHOWN] if ranked.evidence > 0.0]
+    if not shown or shown[0].evidence < GAIN:
+        best = f": the best, {shown[0].name}, gains {shown[0].evidence:.1f} nats of {GAIN:.0f}" if shown else ""
+        return f"no candidate counts{best}"
     head = ("candidate", "coefficient", "sigma", "unit", "evidence", "explained", "not told from")
-    return table(head, rows) if rows else ""
+    legend = f"evidence in nats, from {GAIN:.0f} on it counts; explained: share of what the model leaves"
+    screened = "; ?: an estimate, not fitted" if not all(ranked.fitted for ranked in shown) else ""
+    return f"{table(head, [_row(ranked) for ranked in shown])}\n{legend}{screened}"
 
 
 def _row(ranked: Ranked) -> tuple[str, ...]:
     return (
         ranked.name,
         f"{ranked.coefficient:.4g}",
-        f"{ranked.std:.2g}" if ranked.fitted else "",
+        f"{ranked.std:.2g}" if np.isfinite(ranked.std) else "",
         ranked.unit,
         f"{ranked.evidence:.1f}" + ("" if ranked.fitted else " ?"),
         f"{ranked.explained:.1%}",
@@ -58,33 +69,40 @@ def _row(ranked: Ranked) -> tuple[str, ...]:
 
 
 def steps_table(found: Diagnosis) -> str:
-    """What was added, in order."""
-    rows = [
-        (
-            f"+ {step.effect} on {step.target}",
-            f"{step.coefficient:.4g} +- {step.std:.2g} {step.unit}",
-            ", ".join(f"{name} {value:.3g}" for name, value in step.shape.items()) or "-",
-            f"{step.evidence:.1f}",
-            "; ".join(f"{k} {v['before']:.2f} -> {v['after']:.2f}" for k, v in step.force_explained.items()) or "-",
-        )
-        for step in found.steps
-    ]
-    head = ("added", "coefficient", "shape", "evidence", "force explained")
-    return table(head, rows) if rows else ""
+    """What was added, in order, as the fit of the last model has it; columns that say nothing are left out."""
+    columns = {
+        "added": [f"+ {step.effect} on {step.target}" for step in found.steps],
+        "coefficient": [f"{step.coefficient:.4g} +- {step.std:.2g} {step.unit}" for step in found.steps],
+        "with": [", ".join(f"{name} {value:.3g}" for name, value in step.shape.items()) for step in found.steps],
+        "evidence": [f"{step.evidence:.1f}" for step in found.steps],
+        "share of force that inertias explain": [
+            "; ".join(f"{name} {of['before']:.2f} -> {of['after']:.2f}" for name, of in step.force_explained.items())
+            for step in found.steps
+        ],
+    }
+    said = {head: cells for head, cells in columns.items() if any(cells)}
+    return table(tuple(said), list(zip(*said.values()))) if found.steps else ""
 
 
 def revisions_table(found: Diagnosis) -> str:
-    """Error against revision of the model: of the fit, over the noise floor, of a free run; and whether it is white."""
-    floor = found.residual_rms.noise_floor
+    """Error against revision of the model: RMS over all outputs and of each, of a free run; and whether it is white."""
     runs = [found.free_run_rms.before, *(step.free_run_rms["after"] for step in found.steps)]
-    rows = [
-        (
-            "as given" if k == 0 else f"+ {found.steps[k - 1].effect} on {found.steps[k - 1].target}",
-            f"{model.left.rms:.4g}",
-            f"{model.left.rms / floor:.3f}",
-            f"{run:.4g}",
-            "yes" if model.left.whiteness.white else "no",
-        )
-        for k, (model, run) in enumerate(zip(found.models, runs))
-    ]
-    return table(("revision", "residual RMS m/s^2", "over noise floor", "free run RMS m/s^2", "white"), rows)
+    names = ["as given", *(f"+ {step.effect} on {step.target}" for step in found.steps)]
+    rows = []
+    for name, model, run in zip(names, found.models, runs):
+        white = "yes" if model.left.whiteness.white else "no"
+        each = [f"{value:#.3g}" for value in _each_output(model, model.left.residual)]
+        rows.append((name, f"{model.left.rms / G:#.3g}", *each, f"{run / G:#.3g}", white))
+    first = found.models[0]
+    noise = [np.broadcast_to(record.noise, record.measured.shape) for record in first.records]
+    floor = [f"{value:#.3g}" for value in _each_output(first, noise)]
+    rows.append(("noise floor", f"{found.residual_rms.noise_floor / G:#.3g}", *floor, "", ""))
+    outputs = first.fit.layout.outputs
+    heads = [f"{output.channel} {'kN' if output.fixed else 'g'}" for output in outputs]
+    return table(("RMS of the error", "all g", *heads, "run freely g", "white"), rows)
+
+
+def _each_output(model: Model, values: Sequence[np.ndarray]) -> list[float]:
+    """RMS of each output over the records, in the unit shown; values: per record (n, q) SI."""
+    factor = [READABLE["N" if output.fixed else "m/s^2"][1] for output in model.fit.layout.outputs]
+    return list(np.sqrt(np.nanmean(np.concatenate(values) ** 2, axis=0)) * factor)

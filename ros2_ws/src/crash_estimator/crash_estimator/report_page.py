@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crash_replay.recording import Recording
+from crash_replay.recording import Recording, RecordingError
 
 from .core.characteristic import characteristics
+from .core.diagnosis.diagnosis import diagnose
 from .core.effects import EFFECTS
 from .core.effects.applied import applied
 from .core.effects.base import Effect
@@ -19,6 +20,7 @@ from .core.free_run import compare, free_run
 from .core.methods import make_estimator
 from .core.structure import ModelError, Structure
 from .core.validation import LEVELS, Validation, validate
+from .diagnosis_tables import diagnosis_tables
 from .figures import Line, Panel, draw, markdown_table, write_markdown
 from .tables import READABLE, error_table, parameter_table
 from .validation_tables import comparison_table, covariance_table, whiteness_table
@@ -45,10 +47,11 @@ def write_report(
 ) -> Path:
     """Write `report.md` and its figures into the folder -> the page. The settings go to the methods that have them."""
     folder.mkdir(parents=True, exist_ok=True)
+    page = [f"# {recording.test.title or recording.test.id}", "", *_test(recording, structure, end), ""]
+    page += _missing(recording, structure, end, effects)
     estimated = partial(_estimated, recording, structure, end=end, effects=effects)
     structure = applied(structure, recording.test, effects)
     results = {method: estimated(method, settings=settings) for method in methods}
-    page = [f"# {recording.test.title or recording.test.id}", "", *_test(recording, structure, end), ""]
     page += _tables(results)
     page += _figures(structure, results, folder)
     best = methods[-1]
@@ -78,8 +81,23 @@ def _test(recording: Recording, structure: Structure, end: float) -> list[str]:
         f"- model `{structure.name}`: equations of {', '.join(structure.bodies[k].name for k in structure.equations)}; "
         f"elements {', '.join(f'{e.name} ({e.between[0]}-{e.between[1]})' for e in structure.elements)}",
     ]
+    known = [f"{spec.type} on {spec.target}" for spec in structure.effects]
+    lines += [f"- effects of the model: {', '.join(known)}"] if known else []
     lines += [f"- source: {test.source}"] if test.source else []
     return lines + [f"- {note}" for note in test.notes]
+
+
+def _missing(recording: Recording, structure: Structure, end: float, effects: Mapping[str, Effect]) -> list[str]:
+    """What `diagnose` says; or why it says nothing, which is no reason to say nothing else."""
+    until = recording.time <= end
+    judged = Recording(recording.test, recording.time_ns[until], recording.values[until])
+    try:
+        found = diagnose(structure, [judged], effects)
+    except (ModelError, RecordingError) as error:
+        return ["## What is missing", "", f"Not searched: {error}.", ""]
+    text = found.text[0].upper() + found.text[1:]
+    said = f"{text}. Errors here are of the best fit with one curve for each element over the whole record."
+    return ["## What is missing", "", said, "", _code(diagnosis_tables(found)), ""]
 
 
 def _tables(results: dict[str, Result]) -> list[str]:

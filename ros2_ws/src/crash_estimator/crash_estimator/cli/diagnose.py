@@ -6,15 +6,16 @@ from itertools import permutations
 from pathlib import Path
 
 from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap
 
 from crash_replay.bag import read_bag
 
 from ..core.diagnosis.diagnosis import Diagnosis, diagnose
 from ..core.effects import EFFECTS
-from ..core.effects.base import Effect
+from ..core.effects.base import Effect, UnloadingSlope
 from ..core.effects.targets import key_of
 from ..core.effects.user import load_effects
-from ..core.structure import EffectSpec
+from ..core.structure import EffectSpec, ModelError
 from ..diagnosis_tables import diagnosis_tables
 from ..model_file import load_model, model_path, ready_models
 from .common import guarded, write_json
@@ -34,6 +35,9 @@ def main() -> None:
 def run(arguments: argparse.Namespace) -> None:
     effects = EFFECTS | (load_effects(arguments.effects) if arguments.effects else {})
     structure = load_model(arguments.model)
+    for option, path in (("--json", arguments.json), ("--apply", arguments.apply)):
+        if path:
+            _writable(option, Path(path))
     found = diagnose(structure, [read_bag(bag) for bag in arguments.bags], effects)
     print(f"{found.text}\n\n{diagnosis_tables(found)}")
     if arguments.json:
@@ -43,6 +47,16 @@ def run(arguments: argparse.Namespace) -> None:
         print(f"\n{arguments.apply}: {arguments.model} with {added or 'nothing added'}")
 
 
+def _writable(option: str, path: Path) -> None:
+    """Make its folder. Raises ModelError where it cannot be a file: better now than after the search."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ModelError(f"{option} {path}: {path.parent} cannot be a folder ({error.strerror})") from None
+    if path.is_dir():
+        raise ModelError(f"{option} {path} is a folder: give the file to write")
+
+
 def apply(found: Diagnosis, had: tuple[EffectSpec, ...], effects: dict[str, Effect], model: str, target: str) -> str:
     """Write the model's file, comments and all, with the added effects at its end -> what was added."""
     yaml = YAML()
@@ -50,15 +64,20 @@ def apply(found: Diagnosis, had: tuple[EffectSpec, ...], effects: dict[str, Effe
     added = found.structure.effects[len(had) :]
     if added:
         content.setdefault("effects", [])
-        content["effects"].extend(_entry(spec, effects[spec.type], list(content["bodies"])) for spec in added)
+    for spec, step in zip(added, found.steps):
+        entry = _entry(spec, effects[spec.type], list(content["bodies"]))
+        if "coefficient" in entry:
+            instead = ", takes the place of the element's unloading" * isinstance(effects[spec.type], UnloadingSlope)
+            entry.yaml_add_eol_comment(f"+- {step.std:.2g} {step.unit}{instead}", "coefficient")
+        content["effects"].append(entry)
     with Path(target).open("w", encoding="utf-8") as file:
         yaml.dump(content, file)
     return ", ".join(f"{spec.type} on {spec.target}" for spec in added)
 
 
-def _entry(spec: EffectSpec, effect: Effect, bodies: list[str]) -> dict:
+def _entry(spec: EffectSpec, effect: Effect, bodies: list[str]) -> CommentedMap:
     key = key_of(effect)
-    entry: dict = {"type": spec.type, key: spec.target}
+    entry = CommentedMap({"type": spec.type, key: spec.target})
     if key == "between":
         pair = next(p for p in permutations(bodies, 2) if "-".join(p) == spec.target)
         entry[key] = list(pair)
@@ -67,7 +86,8 @@ def _entry(spec: EffectSpec, effect: Effect, bodies: list[str]) -> dict:
     if spec.shape:
         entry["shape"] = {name: float(f"{value:.6g}") for name, value in spec.shape.items()}
     more = ("host", "touches", "taken_from", "variant")
-    return entry | {name: value for name in more if (value := getattr(spec, name))}
+    entry.update({name: value for name in more if (value := getattr(spec, name))})
+    return entry
 
 
 if __name__ == "__main__":

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from scipy.constants import g as G
+
 from ..core.diagnosis.live_answer import LiveAnswer
 
 CANDIDATES = 3
@@ -22,7 +24,7 @@ def story(revisions: Sequence[Told]) -> list[str]:
     lines = [f"{name}: {answer.text}"]
     worst = sorted(answer.misfit, key=lambda w: -w.rms * (w.end - w.start) ** 0.5)[:WINDOWS]
     lines += [
-        f"  fails at {w.body}, {w.state}, {w.start * 1e3:.1f} to {w.end * 1e3:.1f} ms: residual RMS {w.rms:.3g} m/s^2"
+        f"  fails at {w.body}, {w.state}, {w.start * 1e3:.1f} to {w.end * 1e3:.1f} ms: residual RMS {w.rms / G:.3g} g"
         for w in sorted(worst, key=lambda w: w.start)
     ]
     for place, one in enumerate(answer.ranking[:CANDIDATES] if answer.found else (), start=1):
@@ -34,7 +36,7 @@ def story(revisions: Sequence[Told]) -> list[str]:
     for each, told in revisions:
         left = "white" if told.white[0].white else "not white"
         lines.append(
-            f"  error of {each}: fit {told.rms.before:.3g}, free run {told.free_run.before:.3g} m/s^2 "
-            f"(noise floor {told.noise_floor:.3g}), what is left is {left}"
+            f"  error of {each}: fit {told.rms.before / G:.3g}, free run {told.free_run.before / G:.3g} g "
+            f"(noise floor {told.noise_floor / G:.3g}), what is left is {left}"
         )
     return lines

@@ -15,19 +15,14 @@ from .linearise import balance_of
 from .model import Model
 from .records import Record
 from .search import Round
+from .temper import CFC, SLOWEST
 from .trying import GAIN, Tried
 
 CONFOUNDED = 6.0
 """Nats: evidences closer than this do not tell two candidates apart."""
 
-CFC = 60
-"""The band in which a barrier's force and inertias are compared (SAE J211: the motion of a whole structure) ..."""
-
 ACTS = 0.05
-"""... while the force is above this share of its peak."""
-
-SLOWEST = 10.0 * CFC
-"""Samples in a second that the filter needs."""
+"""A barrier's force and inertias are compared while the force is above this share of its peak."""
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from .layout import Layout
 from .linearise import linearise, output_noise, predicted
 from .linkforce import LinkForce
 from .motion import motion_of
+from .normal import may_diverge
 from .records import Record
 from .trajectory import Trajectory
 from .whiteness import Whiteness, whiteness
@@ -24,6 +25,7 @@ class Left(NamedTuple):
 
     predicted: tuple[np.ndarray, ...]  # per record (n, q) SI
     residual: tuple[np.ndarray, ...]  # per record (n, q) SI, measured minus predicted; NaN where not valid
+    noise: tuple[np.ndarray, ...]  # per record (q,) SI, standard deviation that noise alone gives a residual
     links: tuple[list[LinkForce], ...]
     whiteness: Whiteness
     rms: float  # m/s^2
@@ -36,6 +38,7 @@ def output_scale(layout: Layout) -> np.ndarray:
     return np.array([1.0 / mass if output.fixed else 1.0 for output in layout.outputs])
 
 
+@may_diverge
 def rms(layout: Layout, values: Sequence[np.ndarray]) -> float:
     """Root mean square over all outputs and records, m/s^2."""
     scaled = np.concatenate([(v * output_scale(layout)).ravel() for v in values])
@@ -51,6 +54,7 @@ def assess(fitted: Fit, records: Sequence[Record]) -> Left:
     return _left(fitted.layout, records, fitted.theta, fitted.trajectories)
 
 
+@may_diverge
 def _left(layout: Layout, records: Sequence[Record], theta: np.ndarray, trajectories: Sequence[Trajectory]) -> Left:
     outputs, residuals, links = [], [], []
     for r, (record, trajectory) in enumerate(zip(records, trajectories)):
@@ -59,11 +63,12 @@ def _left(layout: Layout, records: Sequence[Record], theta: np.ndarray, trajecto
         outputs.append(output)
         residuals.append(np.where(record.valid[record.at] > 0.0, record.measured - output, np.nan))
         links.append(equations.links)
-    whitened = [residual / output_noise(layout, record, theta).std for residual, record in zip(residuals, records)]
+    noise = tuple(output_noise(layout, record, theta).std for record in records)
+    whitened = [residual / std for residual, std in zip(residuals, noise)]
     periods = [float(np.median(np.diff(record.time[record.at]))) for record in records]
     white = whiteness(whitened, [record.noise_samples for record in records], periods)
     cost = float(np.nanmean(np.concatenate([w.ravel() for w in whitened]) ** 2))
-    return Left(tuple(outputs), tuple(residuals), tuple(links), white, rms(layout, residuals), cost)
+    return Left(tuple(outputs), tuple(residuals), noise, tuple(links), white, rms(layout, residuals), cost)
 
 
 def free_run(fitted: Fit, records: Sequence[Record]) -> Left:

@@ -122,6 +122,9 @@ def _attached(structure: Structure, scales: Scales, effect: Effect) -> Iterator[
     test = scales.records[0].test
     axes = {channel.axis for channel in test.channels if channel.name in used}
     unused = [c.name for c in test.channels if c.quantity == "acceleration" and c.axis in axes and c.name not in used]
+    signals = scales.records[0].signals
+    copies = {b for a, b in combinations(unused, 2) if np.array_equal(signals[a].values, signals[b].values)}
+    unused = [name for name in unused if name not in copies]
     for channel in unused:
         for host in structure.bodies:
             if host.free or (host.fixed and host.force):

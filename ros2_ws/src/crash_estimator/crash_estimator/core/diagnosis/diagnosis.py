@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from scipy.constants import g as G
+
 from crash_replay.recording import Recording
 
 from ..effects import EFFECTS
@@ -116,9 +118,9 @@ def _answer(structure: Structure, rounds: list[Round], final: Model, present: in
 
 def _text(verdict: str, steps, ranking, first: Model, final: Model, floor: float) -> str:
     names = ", ".join(f"{step.effect} on {step.target}" for step in steps)
-    size = f"residual RMS {first.left.rms:.3g} -> {final.left.rms:.3g} m/s^2, noise floor {floor:.3g}"
+    size = f"residual RMS {first.left.rms / G:.3g} -> {final.left.rms / G:.3g} g, noise floor {floor / G:.3g}"
     if verdict == "adequate":
-        left = f"residual RMS {final.left.rms:.3g} m/s^2, noise floor {floor:.3g}"
+        left = f"residual RMS {final.left.rms / G:.3g} g, noise floor {floor / G:.3g}"
         return f"adequate: nothing significant is missing ({left})"
     if verdict == "effect_missing":
         advice = ""
@@ -126,7 +128,9 @@ def _text(verdict: str, steps, ranking, first: Model, final: Model, floor: float
         if rivals:
             advice = f"; this cannot be told from {', '.join(rivals)}"
             advice += " on one recording: record another speed" if len(first.records) == 1 else " on these recordings"
-        return f"effect missing: {names}; {size}, now white{advice}"
+        small = first.left.rms < NEAR_THE_FLOOR**0.5 * floor
+        why = f"; small, yet noise would not leave it ({steps[0].evidence:.0f} nats of evidence)" if small else ""
+        return f"effect missing: {names}; {size}, now white{why}{advice}"
     worst = final.left.whiteness.worst
     layout = final.fit.layout
     where = (

@@ -5,12 +5,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from crash_replay.conditioning import cfc_filter
+
 from ..effects.base import AttachedBody, BodyForce, BodyInertia
 from .layout import Layout, Link, Place
 from .linkforce import LinkForce, link_force
 from .motion import distortion, driven_motion, measured_motion
 from .propagate import DRIVEN, FIXED, FREE, Linear, Sampling
 from .records import Record
+from .temper import CFC, SLOWEST
 from .trajectory import Trajectory, measured_crush
 
 
@@ -145,11 +148,19 @@ def _body_effect(layout, record, place: Place, theta, trajectory, loads, externa
     if isinstance(addition.effect, BodyForce):
         k, force = layout.structure.body_index[addition.target], addition.effect.force(record.time)
     elif isinstance(addition.effect, AttachedBody):
-        k, force = layout.structure.body_index[addition.host], -trajectory.a[:, layout.attached[addition.target]]
+        a = trajectory.a[:, layout.attached[addition.target]]
+        k, force = layout.structure.body_index[addition.host], -_rigid(record, a)
     else:
         return
     loads[:, k] += c * force
     external_for(place.coefficient)[:, k] += force * inverse[k]
+
+
+def _rigid(record: Record, a: np.ndarray) -> np.ndarray:
+    """(g,) the acceleration that acts as inertia; where noise stands for what is left of a structure that rings
+    (`mix`), its ringing is none: what counts is the band in which such outputs are compared."""
+    step = float(record.dt[-1])
+    return a if record.mix is None or step * SLOWEST > 1.0 else cfc_filter(a, step, CFC)
 
 
 class Noise(NamedTuple):

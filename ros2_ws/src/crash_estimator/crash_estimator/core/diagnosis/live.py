@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from time import process_time
 
 import numpy as np
+from scipy.constants import g as G
 
 from crash_replay.recording import Recording, Test
 
@@ -127,15 +128,15 @@ def _spec(addition: Addition) -> EffectSpec:
 
 def _text(recording: Recording, answer: LiveAnswer) -> str:
     so_far = f"up to {recording.time_ns[-1] * 1e-6:.1f} ms: "
-    floor = f"noise floor {answer.noise_floor:.3g}"
-    before, after = answer.rms
+    floor = f"noise floor {answer.noise_floor / G:.3g}"
+    before, after = (rms / G for rms in answer.rms)
     if answer.verdict == "adequate":
-        return so_far + f"nothing significant is missing (residual RMS {before:.3g} m/s^2, {floor})"
+        return so_far + f"nothing significant is missing (residual RMS {before:.3g} g, {floor})"
     if answer.verdict == "unexplained":
-        return so_far + f"unexplained: residual RMS {before:.3g} m/s^2, {floor}; no candidate explains it yet"
+        return so_far + f"unexplained: residual RMS {before:.3g} g, {floor}; no candidate explains it yet"
     best = answer.ranking[0]
     rivals = f", not yet told from {', '.join(best.confounded_with)}" if best.confounded_with else ""
     return so_far + (
         f"effect missing: {best.name}, {best.coefficient:.4g} +- {best.std:.2g} {best.unit}{rivals}; "
-        f"residual RMS {before:.3g} -> {after:.3g} m/s^2, {floor}"
+        f"residual RMS {before:.3g} -> {after:.3g} g, {floor}"
     )

@@ -44,6 +44,8 @@ class LiveAnswer(NamedTuple):
     misfit: tuple[MisfitWindow, ...]  # of the recording that is replayed
     fits: tuple[FitCurves, ...]  # of the model as it is, then with each effect that was found
     final: bool = False
+    force: str = ""  # channel of the measured force, where the share that all inertias explain is known
+    force_explained: Change = Change(np.nan, np.nan)  # with the first of what was found
 
 
 def final_answer(found: Diagnosis) -> LiveAnswer:
@@ -51,6 +53,7 @@ def final_answer(found: Diagnosis) -> LiveAnswer:
     first, last = found.models[0], found.models[-1]
     present = len(first.additions)
     effects = found.structure.effects[present:]
+    force, share = next(iter(found.steps[0].force_explained.items() if found.steps else ()), ("", {}))
     return LiveAnswer(
         verdict=found.verdict,
         text=found.text,
@@ -66,6 +69,8 @@ def final_answer(found: Diagnosis) -> LiveAnswer:
             for m in found.models
         ),
         final=True,
+        force=force,
+        force_explained=Change(**share) if share else Change(np.nan, np.nan),
     )
 
 

@@ -38,7 +38,7 @@ def misfit_windows(layout: Layout, records: Sequence[Record], left: Left) -> tup
         length = max(int(round(WINDOW / float(np.median(np.diff(time))))), 4)
         for q, output in enumerate(layout.outputs):
             residual, scale = left.residual[r][:, q], output_scale(layout)[q]
-            z2 = np.nan_to_num(residual / record.noise[q]) ** 2
+            z2 = np.nan_to_num(residual / left.noise[r][q]) ** 2
             mean = np.convolve(z2, np.full(length, 1.0 / length), "same")
             outside = mean > chdtri(length, SIGNIFICANT / tests) / length  # a sum of squares: chi-squared
             for first, last in _runs(outside, length):

@@ -14,6 +14,12 @@ from scipy.fft import dct
 
 from .records import Record, bins_of
 
+CFC = 60
+"""The band in which forces and inertias of a structure that rings are compared (SAE J211: its motion as a whole)."""
+
+SLOWEST = 10.0 * CFC
+"""Samples in a second that the filter needs."""
+
 BIN = 4e-3
 """s: means over it keep what is below 125 Hz; CFC 60 is 3 dB down at 100 Hz."""
 

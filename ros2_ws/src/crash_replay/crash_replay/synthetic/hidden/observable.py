@@ -83,7 +83,8 @@ def targets(specimen: Specimen, peaks: Peaks, effect: str) -> list[str]:
             return pressed
         case "plastic_unloading":
             return [e for e in pressed if peaks.drop[e] >= UNLOADS]
-    return [e for e in pressed if specimen.told(e) != "curve"]
+    known = specimen.model["elements"]  # not one that is hidden itself
+    return [e for e in pressed if e in known and specimen.told(e) != "curve"]
 
 
 def shows(bare: Specimen, effect: str, target: str, with_it: Specimen) -> bool:
