@@ -3,14 +3,18 @@
 help: # what there is to make
 	@sed -n 's/^\([a-z-]*\):.*# /make \1	/p' Makefile
 
-demo: # a crash replayed, what its model lacks named, added and shown in Rerun; of your own with RECORDING=path WITH=path
-	@tools/run crash_estimator demo $(if $(RECORDING),--recording "$(RECORDING)") $(if $(WITH),--with "$(WITH)")
+demo: # a crash replayed, what its model lacks named, added and shown in Rerun; of your own with RECORDING=path, WITH=path, MODEL=file
+	@tools/run crash_estimator demo $(if $(RECORDING),--recording "$(RECORDING)") $(if $(WITH),--with "$(WITH)") $(if $(MODEL),--model "$(MODEL)")
 
 # Without autoload: the plugins of an installed ROS 2 are written for an older pytest.
+PYTEST = PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 tools/env python -m pytest -p _hypothesis_pytestplugin -p xdist.plugin
+
+# A file's tests are run by one of two processes; -n 0 in PYTEST_ARGS: all by one. What is compiled is so once, before.
 test: # all tests; some of them with PYTEST_ARGS="-k name"
 	@tools/setup
 	@tools/screenshot-libs
-	@PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 tools/env python -m pytest -p _hypothesis_pytestplugin $(PYTEST_ARGS)
+	@tools/env python -m crash_estimator.core.compiled.warm_up
+	@$(PYTEST) -n 2 --dist loadfile $(PYTEST_ARGS)
 
 bags: # the simulated recordings in bags/, made anew
 	@tools/run crash_replay synthesize --all --to bags

@@ -11,9 +11,12 @@ from pathlib import Path
 
 import pytest
 from ament_index_python.packages import get_package_prefix
+from helpers_domain import own_domain
 
 ROOT = Path(__file__).resolve().parent.parent
 BAG = ROOT / "bags/frontal_engine_cab.mcap"
+TEST = "PYTEST_CURRENT_TEST"
+"""pytest's environment variable, which whatever a test starts inherits."""
 
 
 class Demo:
@@ -22,14 +25,14 @@ class Demo:
     def __init__(self, out: Path, *arguments: str):
         self.out, self.text = out, out.with_suffix(".txt")
         executable = Path(get_package_prefix("crash_estimator")) / "lib/crash_estimator/demo"
-        environment = {k: v for k, v in os.environ.items() if k not in ("ROS_DOMAIN_ID", "DISPLAY", "WAYLAND_DISPLAY")}
+        environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
         with self.text.open("w") as file:
             self.process = subprocess.Popen(
                 [sys.executable, str(executable), "--out", str(out), *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=file,
                 stderr=subprocess.STDOUT,
-                env=environment | {"PYTHONIOENCODING": "utf-8"},
+                env=environment | {"PYTHONIOENCODING": "utf-8", "ROS_DOMAIN_ID": str(own_domain())},
                 start_new_session=True,
             )
         self.children: set[int] = set()
@@ -99,6 +102,20 @@ def children_of(parent: int) -> list[int]:
             continue
         if int(fields[1]) == parent:
             found.append(int(stat.parent.name))
+    return found
+
+
+def left_over_in(domain: str) -> list[str]:
+    """Command lines of the processes that this test has started on a ROS domain and that still run."""
+    wanted = {f"{name}={value}".encode() for name, value in (("ROS_DOMAIN_ID", domain), (TEST, os.environ[TEST]))}
+    found = []
+    for environment in Path("/proc").glob("[0-9]*/environ"):
+        try:
+            variables = environment.read_bytes().split(b"\0")
+        except OSError:  # it has ended meanwhile, or is somebody else's
+            continue
+        if wanted <= set(variables):
+            found.append(command_line(int(environment.parent.name)))
     return found
 
 

@@ -8,12 +8,13 @@ import numpy as np
 import rclpy
 import yaml
 from crash_msgs.msg import Misfit, Ranking, Residuals, Samples, TestInfo
+from helpers_domain import own_domain
+from helpers_waiting import PATIENCE
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from crash_estimator.core.structure import Structure
-from crash_estimator.demo.domain import free_domain
 from crash_estimator.model_file import ModelFile
 from crash_estimator.nodes.diagnosis_node import DiagnosisNode
 from crash_replay.bag import time_zero_ns
@@ -43,7 +44,7 @@ class Stage:
     """A replay's stand-in and listener, with diagnosis nodes."""
 
     def __init__(self):
-        rclpy.init(domain_id=free_domain())
+        rclpy.init(domain_id=own_domain())
         self.executor = EventsExecutor()
         self.node = Node("stage")
         self.executor.add_node(self.node)
@@ -70,9 +71,9 @@ class Stage:
     def wait_for_listeners(self) -> None:
         count = len(self.diagnoses)
         listening = self.samples.get_subscription_count
-        self.spin_until(lambda: listening() == count, "the diagnosis subscribes", 60.0)
+        self.spin_until(lambda: listening() == count, "the diagnosis subscribes")
 
-    def spin_until(self, done: Callable[[], bool], what: str, patience: float = 30.0) -> None:
+    def spin_until(self, done: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
         deadline = time.monotonic() + patience
         while not done():
             assert time.monotonic() < deadline, f"waited {patience:g} s in vain until {what}"
@@ -102,7 +103,7 @@ class Stage:
         return [message for message in self.heard[name]["ranking"] if message.final]
 
     def wait_for_finals(self, count: int, name: str = "diagnosis") -> Ranking:
-        self.spin_until(lambda: len(self.finals(name)) >= count, f"{name} has said {count} final answers", 60.0)
+        self.spin_until(lambda: len(self.finals(name)) >= count, f"{name} has said {count} final answers")
         self.spin(0.05)
         return self.finals(name)[count - 1]
 

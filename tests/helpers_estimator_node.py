@@ -10,12 +10,18 @@ from pathlib import Path
 
 import numpy as np
 import rclpy
-from crash_msgs.msg import EstimatorState, Event, Forces, Parameters, Residuals, Samples, TestInfo
+from crash_msgs.msg import EstimatorState, Event, Forces, Parameters, ReplayState, Residuals, Samples, TestInfo
+from helpers_domain import own_domain
+from helpers_waiting import PATIENCE
+from numpy.testing import assert_array_equal
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from crash_estimator.demo.domain import free_domain
+from crash_estimator.core.estimate import Estimate
+from crash_estimator.core.fold import run
+from crash_estimator.core.methods import make_estimator
+from crash_estimator.model_file import load_model
 from crash_estimator.nodes.estimator_node import EstimatorNode
 from crash_replay.qos import LATCHED, STREAM
 from crash_replay.recording import Recording
@@ -42,7 +48,7 @@ class Stage:
     """A replay's stand-in and listener, and the estimators it feeds."""
 
     def __init__(self):
-        self.domain = free_domain()
+        self.domain = own_domain()
         rclpy.init(domain_id=self.domain)
         self.executor = EventsExecutor()
         self.node = Node("stage")
@@ -52,6 +58,7 @@ class Stage:
         self.estimators: list[EstimatorNode] = []
         self.heard: dict[str, dict[str, list]] = {}
         self.processes: list[subprocess.Popen] = []
+        self.replayed: list[ReplayState] = []
 
     def close(self) -> None:
         for process in self.processes:
@@ -74,7 +81,7 @@ class Stage:
         self.spin_until(lambda: all(p.get_subscription_count() for p in out), "somebody listens to the estimator")
         return node
 
-    def spin_until(self, done: Callable[[], bool], what: str, patience: float = 10.0) -> None:
+    def spin_until(self, done: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
         deadline = time.monotonic() + patience
         while not done():
             assert time.monotonic() < deadline, f"waited {patience:g} s in vain until {what}"
@@ -98,7 +105,13 @@ class Stage:
 
     def replay(self, bag: Path, **parameters) -> subprocess.Popen:
         """Start the real replay, one sample a message."""
+        self.node.create_subscription(ReplayState, "replay_state", self.replayed.append, LATCHED)
         return self.start("crash_replay.replay_node", bag=bag, **{"block": 1} | parameters)
+
+    def wait_until_found(self, subscribers: int, patience: float = PATIENCE) -> None:
+        """Until the replay has found so many of them; a command that comes before would end its waiting."""
+        found = lambda: self.replayed and self.replayed[-1].subscribers == subscribers  # noqa: E731
+        self.spin_until(found, f"the replay has found {subscribers} subscribers", patience)
 
     def start(self, module: str, name: str = "", **parameters) -> subprocess.Popen:
         """A node in a process of its own, ended with the stage."""
@@ -118,7 +131,7 @@ class Stage:
         self.node.create_subscription(EstimatorState, f"{name}/state", states.append, LATCHED)
         return self.heard[name]
 
-    def call(self, kind: type, service: str, patience: float = 10.0, **request):
+    def call(self, kind: type, service: str, patience: float = PATIENCE, **request):
         """The response of a service."""
         client = self.node.create_client(kind, service)
         self.spin_until(client.service_is_ready, f"there is a service {service}", patience)
@@ -127,7 +140,7 @@ class Stage:
         self.node.destroy_client(client)
         return call.result()
 
-    def wait_for(self, name: str, messages: int, patience: float = 10.0) -> dict[str, list]:
+    def wait_for(self, name: str, messages: int, patience: float = PATIENCE) -> dict[str, list]:
         """What was heard of an estimator, once it has said so much about parameters, residuals and forces."""
         heard = self.heard[name]
         topics = ("parameters", "residuals", "forces")
@@ -148,3 +161,28 @@ def joined(messages: list, field: str) -> np.ndarray:
 
 def empty_samples(number: int, values: list[float]) -> Samples:
     return Samples(number=number, time_ns=array("q", [0]), values=array("d", values))
+
+
+def offline(model: str, recording: Recording, method: str, **settings) -> list[Estimate]:
+    return run(make_estimator(load_model(model), recording.test, method, **settings), recording.samples())
+
+
+def assert_same(heard: dict[str, list], estimates: list[Estimate]) -> None:
+    """Every published number equals the loop's to the last bit (NaN where it is NaN)."""
+    own = {
+        "parameters": {"value": "parameters", "std": "std", "status": "status"},
+        "residuals": {name: name for name in ("measured", "predicted", "innovation", "residual", "residual_std")},
+        "forces": {
+            name: name
+            for name in ("crush", "rate", "force", "force_std", "state", "displacement", "velocity", "acceleration")
+        },
+    }
+    for topic, fields in own.items():
+        messages = heard[topic]
+        assert_array_equal(joined(messages, "time_ns")[:, 0], [e.time_ns for e in estimates])
+        for field, name in fields.items():
+            assert_array_equal(joined(messages, field), [getattr(e, name) for e in estimates], err_msg=field)
+    spread = [np.sqrt(np.diagonal(e.innovation_covariance)) for e in estimates]
+    assert_array_equal(joined(heard["residuals"], "innovation_std"), spread)
+    said = [(m.number, m.kind, m.target, m.value, m.text) for m in heard["events"]]
+    assert said == [(e.number, *event) for e in estimates for event in e.events]

@@ -10,6 +10,8 @@ from threading import Thread
 import numpy as np
 import rclpy
 from crash_msgs.msg import ReplayState, Samples, TestInfo
+from helpers_domain import own_domain
+from helpers_waiting import PATIENCE
 from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -20,7 +22,7 @@ from crash_replay.recording import Channel, Recording, Test
 from crash_replay.ros_messages import samples_from_msg
 from crash_replay.ros_runtime import acknowledge_promptly, spin
 
-DOMAIN = 1 + os.getpid() % 100
+DOMAIN = own_domain()
 """Other tests, and other people's nodes, must not hear us: each test process has a domain."""
 
 
@@ -54,7 +56,7 @@ class Replay:
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
         self.process = subprocess.Popen(command, env=environment(), text=True, **pipes)
 
-    def end(self, timeout: float = 30.0) -> tuple[int, str, str]:
+    def end(self, timeout: float = PATIENCE) -> tuple[int, str, str]:
         output, errors = self.process.communicate(timeout=timeout)
         # what processes that were killed have left in shared memory makes Fast DDS complain, to nobody's harm
         output = "".join(line for line in output.splitlines(keepends=True) if "RTPS_" not in line)
@@ -111,9 +113,9 @@ class Listener:
 
     def call(self, service_type, name: str, **request):
         client = self.node.create_client(service_type, f"replay/{name}")
-        assert client.wait_for_service(timeout_sec=10.0), f"no service {name}"
+        assert client.wait_for_service(timeout_sec=PATIENCE), f"no service {name}"
         future = client.call_async(service_type.Request(**request))
-        wait_until(future.done, 10.0)
+        wait_until(future.done)
         self.node.destroy_client(client)
         return future.result()
 
@@ -129,7 +131,7 @@ class Listener:
         rclpy.shutdown(context=self.context)
 
 
-def wait_until(condition, timeout: float = 10.0) -> None:
+def wait_until(condition, timeout: float = PATIENCE) -> None:
     limit = time.monotonic() + timeout
     while not condition():
         assert time.monotonic() < limit, "waited in vain"

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from helpers_waiting import PATIENCE
 from rerun.chunk import RrdReader
 
 from crash_estimator.viewer.blocks import Block, EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock
@@ -168,7 +169,7 @@ def feed(target: Recorder, crash: Crash, streams: dict[str, list], run: int = 0,
     settle(target)
 
 
-def settle(target: Recorder, patience: float = 20.0) -> None:
+def settle(target: Recorder, patience: float = PATIENCE) -> None:
     deadline = time.monotonic() + patience
     while not target.idle:
         assert time.monotonic() < deadline, "the recorder does not come to an end"

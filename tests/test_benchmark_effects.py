@@ -63,12 +63,14 @@ def test_every_effect_of_every_structure_is_asked_for_at_every_noise_in_one_reco
 def test_any_beginning_of_the_plan_is_a_sample_of_the_whole():
     kinds = [kind_of(case) for case in plan()]
     for kind in ("nothing", "one", "two", "outside"):
-        assert_allclose(kinds[:300].count(kind) / 300, kinds.count(kind) / len(kinds), atol=0.06)  # 2 sigma of 300 draws
+        share = kinds.count(kind) / len(kinds)
+        assert_allclose(kinds[:300].count(kind) / 300, share, atol=0.06)  # 2 sigma of 300 draws
 
 
 def test_a_name_is_its_case():
     assert all(case_of(case.name) == case for case in plan())
-    with pytest.raises(RecordingError, match="name is written like dummy/coulomb_friction/1/1g/10000Hz/0.75,1.1/1, got 'x'"):
+    like = "dummy/coulomb_friction/1/1g/10000Hz/0.75,1.1/1"
+    with pytest.raises(RecordingError, match=f"name is written like {like}, got 'x'"):
         case_of("x")
 
 
@@ -96,9 +98,8 @@ def test_a_wrong_answer_can_name_the_right_one_as_its_rival():
 
 @pytest.mark.parametrize(("stop", "counts"), [(0.0505, True), (0.054, False)])
 def test_a_stop_where_the_hidden_gap_closes_is_that_gap(stop, counts):
-    found = row(
-        first=("bottoming_out", "car_barrier"), hidden=[{"effect": "clearance", "target": "car_barrier", "coefficient": 0.05}]
-    )  # fmt: skip
+    gap = {"effect": "clearance", "target": "car_barrier", "coefficient": 0.05}
+    found = row(first=("bottoming_out", "car_barrier"), hidden=[gap])
     found["ranking"][0]["shape"] = {"stop": stop}
     assert right_first(found) is counts and pull(found) is None
     found["hidden"][0]["target"] = "other"
@@ -165,7 +166,9 @@ def test_page_counts_what_the_rows_say():
     rows = [
         row(), row(case=CASE._replace(seed=6)), row(case=CASE._replace(seed=7), first=("channel_gain", "car_ax")),
         row("adequate", case=none, hidden=[], steps=[]),
-        row(case=CASE._replace(speeds=ONE), first=("channel_gain", "car_ax"), rivals=["viscous_damping on car_barrier"]),
+        row(
+            case=CASE._replace(speeds=ONE), first=("channel_gain", "car_ax"), rivals=["viscous_damping on car_barrier"]
+        ),
         {"case": CASE._replace(seed=9).name, "not_drawn": "no target"},
     ]  # fmt: skip
     text = page(rows, [{"time": {"wall": 2.0, "cpu": 1.9, "updates": [0.1, 0.2]}}], 6, "abc")
@@ -174,7 +177,8 @@ def test_page_counts_what_the_rows_say():
     assert "| `adequate` where nothing is hidden, two recordings | 98 % | 100 % (21 to 100) of 1 |" in text
     assert "| one recording: wrong, and its rival not named | none | 0 of 1 |" in text
     assert "| `viscous_damping` | - | 2/3 | - | 67 % (21 to 94) of 3 | 0 % (0 to 79) of 1 |" in text
-    assert f"| {CASE._replace(seed=7).name} | viscous_damping on car_barrier | effect_missing | channel_gain on car_ax |" in text
+    wrong = "viscous_damping on car_barrier | effect_missing | channel_gain on car_ax"
+    assert f"| {CASE._replace(seed=7).name} | {wrong} |" in text
 
 
 def test_page_of_nothing_is_a_page():

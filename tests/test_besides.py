@@ -8,8 +8,8 @@ from builtin_interfaces.msg import Time
 from helpers_estimation import oscillator, oscillator_recording
 from numpy.testing import assert_array_equal
 
-from crash_estimator.cli.estimate import as_json
 from crash_estimator.cli.common import write_json
+from crash_estimator.cli.estimate import as_json
 from crash_estimator.core.errors import equation_errors
 from crash_estimator.core.estimate import ParameterStatus
 from crash_estimator.core.fold import run

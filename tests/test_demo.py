@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers_demo import BAG, ROOT, demo, rows, view_origins  # noqa: F401  the fixture demo
-from ruamel.yaml import YAML
 
 from crash_estimator.core.errors import equation_errors
 from crash_estimator.core.fold import run
@@ -49,40 +48,6 @@ def test_the_whole_show_without_a_screen(demo, recording):  # noqa: F811
     assert f"rerun {show.folder}/demo.rrd\n" in said and "What to look at, by tab:" in said
     _every_view_has_data(show.folder / "demo.rrd", total)
     _curves_can_be_seen(show.folder / "demo.rrd")
-
-
-def test_the_story_of_the_hidden_effect(demo):  # noqa: F811
-    """The bundled recording: friction between rib and spine that its model lacks, found, added, and the error gone."""
-    show = demo("--rate", "0.05")
-    show.wait_for_samples()
-    assert show.end(180.0) == 0, show.said()
-    assert not show.left_over()
-    said, total = show.said(), 1401
-    assert f"{total}/{total} samples" in said and " 0 lost\n" in said
-    lines = said.splitlines()
-    told = [next((k for k, line in enumerate(lines) if line.startswith(part)), None) for part in STORY]
-    assert None not in told and told == sorted(told), said
-    done = r"^added to hidden_effect: revision 1: .*coulomb_friction on rib_spine.*1401 samples estimated again"
-    assert re.search(done, said, re.M), said  # when it is done, which may be after the diagnosis' last word
-    errors = re.search(r"^the error falls: ([\d.]+) -> ([\d.]+) g .* noise floor ([\d.]+)", said, re.M)
-    before, after, floor = (float(number) for number in errors.groups())
-    assert after < 1.05 * floor < 0.5 * before
-    coefficient, std = re.search(r"what it lacks: coulomb_friction on rib_spine, (\d+) ± (\d+) N", said).groups()
-    (truth,) = YAML().load(ROOT / "bags/hidden_effect.truth.yaml")["hidden"]
-    assert (truth["effect"], truth["target"]) == ("coulomb_friction", "rib_spine")
-    assert abs(float(coefficient) - truth["coefficient"]) < 3 * float(std)
-    counts, origins = rows(show.folder / "demo.rrd"), view_origins(show.folder / "demo.rrd")
-    wanted = {"/ranking/0", "/ranking/1", "/error", "/whiteness/rib", "/revision/rib", "/left/spine", "/free_run/rib"}
-    assert wanted <= origins
-    for origin in wanted:
-        assert any(path.startswith(f"{origin}/") and n for path, n in counts.items()), f"view of {origin} is empty"
-    assert counts["/revision/rib/whole/model/00"] == counts["/revision/rib/whole/model/01"] > 0.6 * total
-
-
-STORY = (
-    "all samples: effect missing", "where it fails: rib, loading", "what it lacks: coulomb_friction on rib_spine",
-    "the error falls", "verdict with it: adequate",
-)  # fmt: skip
 
 
 def _every_view_has_data(rrd: Path, total: int) -> None:
@@ -158,11 +123,11 @@ def test_nothing_is_left_where_the_demonstration_is_killed(demo):  # noqa: F811
     assert len(show.children) == 3
     show.process.kill()
     show.process.wait()
-    assert not show.left_over(patience=10.0)
+    assert not show.left_over(patience=60.0)
 
 
 @pytest.mark.parametrize(
-    ("killed", "status"), [(["viewer"], 0), (["mrls"], 0), (["replay"], 1), (["mrls", "constrained_kalman"], 1)]
+    ("killed", "status"), [(["viewer", "mrls"], 0), (["replay"], 1), (["mrls", "constrained_kalman"], 1)]
 )
 def test_who_dies_is_named_and_the_others_go_on(demo, killed, status):  # noqa: F811
     show = demo(*([] if "viewer" in killed else ["--no-viewer"]), *PLAIN, "--rate", "0.05")
@@ -203,7 +168,7 @@ def test_an_estimator_that_never_comes_does_not_keep_the_others_waiting(demo):  
 )
 def test_what_cannot_be_shown_is_one_line(arguments, status, complaint, tmp_path):
     command = [sys.executable, "-m", "crash_estimator.demo.command", "--out", str(tmp_path), *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=30, cwd=ROOT)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=ROOT)
     assert done.returncode == status
     assert complaint in done.stderr
     if status == 1:

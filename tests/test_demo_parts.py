@@ -1,11 +1,13 @@
 """What the demonstration is made of: the choice of recording and estimators, the domain, the terminal."""
 
+import socket
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers_domain import OWN_DOMAINS
 from numpy.testing import assert_allclose
 
 from crash_estimator.core.structure import ModelError
@@ -149,15 +151,11 @@ def test_the_domain_is_free_and_the_users_own_is_kept(monkeypatch):
     assert own_environment()["ROS_DOMAIN_ID"] == "7"
 
 
-def test_a_domain_in_use_is_passed_over(monkeypatch):
-    import socket
-
-    from crash_estimator.demo import domain
-
-    monkeypatch.setattr(domain, "DOMAINS", range(99, 101))
+def test_a_domain_in_use_is_passed_over():
+    used, free = OWN_DOMAINS[-2:]  # no other test process takes these
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-        taken.bind(("0.0.0.0", 7400 + 250 * 99 + 10))
-        assert {free_domain() for _ in range(20)} == {100}
+        taken.bind(("0.0.0.0", 7400 + 250 * used + 10))
+        assert {free_domain((used, free)) for _ in range(20)} == {free}
 
 
 class TestTerminal:

@@ -43,6 +43,12 @@ def test_what_cannot_be_told_apart_is_said():
     assert tell(Story(), block, misfit(0.06))[-1] == "not told from it here: a on b, c on d, e on f and 1 more"
 
 
+def test_the_share_of_a_measured_force_is_told():
+    share = dict(force="barrier_fx", force_explained_before=0.102, force_explained_after=0.81)
+    told = tell(Story(), ranking(0.09, 300.0, final=True, **share), misfit(0.06))
+    assert told[-1] == "share of barrier_fx that the inertias explain: 10% -> 81%"
+
+
 OTHER = ranking(0.01, 20.0)._replace(ranking=(candidate("x on y", 20.0),))
 
 

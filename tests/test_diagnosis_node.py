@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from crash_msgs.srv import AddEffect, GetSamples, RemoveEffect
 from helpers_diagnosis import Stage, hidden_case, joined
+from helpers_waiting import PATIENCE
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.core.diagnosis.diagnosis import Diagnosis, diagnose
@@ -268,7 +269,7 @@ def test_a_request_carries_all_that_was_found(case):
 )
 def test_what_cannot_work_on_any_test_ends_the_node_with_one_line(arguments, complaint):
     command = [sys.executable, "-m", "crash_estimator.nodes.diagnosis_node", "--ros-args", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=30)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 1
     lines = done.stderr.strip().splitlines()
     assert len(lines) == 1 and lines[0].startswith("error: ") and complaint in lines[0], done.stderr

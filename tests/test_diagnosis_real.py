@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from crash_estimator.core.diagnosis.diagnosis import diagnose
+from crash_estimator.core.diagnosis.live_answer import final_answer
 from crash_estimator.model_file import load_model
 from crash_replay.readers import read_source
 
@@ -58,3 +59,5 @@ def test_the_engine_is_named_that_a_one_mass_car_lacks():
     assert first.coefficient == pytest.approx(400.0, rel=0.15)
     share = first.force_explained["barrier_fx"]
     assert share["before"] < 0.15 and share["after"] > 0.8
+    answer = final_answer(found)
+    assert (answer.force, answer.force_explained) == ("barrier_fx", (share["before"], share["after"]))

@@ -96,7 +96,7 @@ def test_what_a_diagnosis_writes_is_estimated(monkeypatch, capsys, folder, effec
     _, what, recording, _ = hidden(effect, place)
     spec = with_it(effect, place, what.coefficient).effects[-1]
     content = dict(draw_case(place, [effect], SEED).specimen.model)
-    content = {**content, "effects": [_entry(spec, EFFECTS[effect], list(content["bodies"]))]}
+    content = {**content, "effects": [dict(_entry(spec, EFFECTS[effect], list(content["bodies"])))]}
     model, bag = folder / f"{effect}.yaml", folder / f"{effect}.mcap"
     with model.open("w") as file:
         YAML(typ="safe").dump(content, file)

@@ -66,7 +66,8 @@ def test_rls_with_forgetting_one_is_weighted_least_squares_at_every_sample():
     # Ljung's weights 1 / Lambda_t, recomputed from the published innovations: gamma = 1/2, 1/3, ...
     before = recording.values[recording.time_ns < 0, 0]
     weights, gamma, error_covariance = np.zeros(len(recording)), 1.0, None
-    variances, variance = np.zeros(len(recording)), None  # and the noise's variance from the residuals, never below that before
+    # and the noise's variance from the residuals, never below that before
+    variances, variance = np.zeros(len(recording)), None
     for k in np.flatnonzero(recording.time_ns > 0):
         gamma = 1.0 / (1.0 / gamma + 1.0)
         if error_covariance is None:
@@ -110,7 +111,8 @@ def test_bounds_that_never_bind_change_nothing(method):
     )
 
 
-@pytest.mark.parametrize("method", ["rls", "mrls", "constrained_kalman"])  # the others know no bounds, or explain by noise
+# the other methods know no bounds, or explain by noise
+@pytest.mark.parametrize("method", ["rls", "mrls", "constrained_kalman"])
 def test_a_negative_stiffness_is_clamped_to_zero_and_the_rest_estimated_again(method):
     recording = oscillator_recording(stiffness=2.0e4, damping=300.0, noise=NOISE)
     flipped = type(recording)(recording.test, recording.time_ns, recording.values * [1.0, -1.0, 1.0])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from crash_msgs import msg
 from crash_msgs.srv import Step
-from mcap.reader import make_reader
 from helpers_replay import Listener, Replay, environment, some_recording, wait_until
+from mcap.reader import make_reader
 from rclpy.serialization import serialize_message
 
 from crash_replay.bag import write_bag
@@ -105,7 +105,7 @@ def test_it_records_the_samples_and_ends_when_the_replay_is_gone(tmp_path):
     recorder = subprocess.Popen(command, env=environment(), stdout=subprocess.PIPE, text=True)
     try:
         with Replay(bag, start_paused=True, keep_alive=True, wait_for=2) as replay, Listener() as listener:
-            wait_until(lambda: listener.states and listener.states[-1].subscribers == 2, timeout=30.0)
+            wait_until(lambda: listener.states and listener.states[-1].subscribers == 2)
             assert listener.call(Step, "step", n=3).success
             wait_until(lambda: len(listener.numbers()) == 3)
             replay.interrupt()

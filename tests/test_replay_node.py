@@ -85,12 +85,12 @@ def test_only_channels_that_somebody_listens_to_are_made(listener, monkeypatch):
 
 
 def test_blocks_hold_the_same_samples(tmp_path, listener):
-    recording = some_recording(503, period_ns=100_000)  # 10 kHz: 2000 messages a second with 5 samples each
+    recording = some_recording(503, period_ns=100_000)  # 10 kHz: 400 messages a second with 25 samples each
     with Replay(write_bag(recording, tmp_path / "b"), wait_for=1) as replay:
         status, output, errors = replay.end()
     assert (status, errors) == (0, "")
-    assert output.startswith("finished: 503 samples sent in 101 messages")
-    wait_until(lambda: len(listener.messages) == 101)
+    assert output.startswith("finished: 503 samples sent in 21 messages")
+    wait_until(lambda: len(listener.messages) == 21)
     assert listener.numbers() == [(0, number) for number in range(503)]
     assert [sample.time_ns for sample in listener.samples()] == recording.time_ns.tolist()
     assert_array_equal(np.array([sample.values for sample in listener.samples()]), recording.values)
@@ -229,10 +229,10 @@ def test_a_subscriber_that_is_slow_loses_nothing(tmp_path):
         Listener(stall=2.0) as listener,
         Replay(write_bag(recording, tmp_path / "long.mcap"), rate=1000, block=1, wait_for=1) as replay,
     ):
-        status, output, errors = replay.end(timeout=60.0)
+        status, output, errors = replay.end()
         assert (status, errors) == (0, "")
         assert output.startswith(f"finished: {n} samples sent in {n} messages")
-        wait_until(lambda: len(listener.messages) >= n, timeout=30.0)
+        wait_until(lambda: len(listener.messages) >= n)
         assert listener.numbers() == [(0, number) for number in range(n)]
 
 

@@ -75,13 +75,6 @@ def _qos(text: str) -> QoSProfile:
     )
 
 
-@pytest.fixture
-def stage():
-    stage = Stage()
-    yield stage
-    stage.close()
-
-
 @pytest.fixture(scope="module")
 def whole():
     """Parameters after every sample, as the one loop gives them."""

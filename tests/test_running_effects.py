@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from crash_msgs.srv import AddEffect, RemoveEffect
 from helpers_estimation import oscillator_recording
-from helpers_estimator_node import Stage, joined
+from helpers_estimator_node import joined
 from numpy.testing import assert_array_equal
 from rclpy.parameter import Parameter
 
@@ -36,13 +36,6 @@ from crash_estimator.core.effects.base import ElementForce
 
 EFFECT = ElementForce("cubic_damping", "N*s^3/m^3", force=lambda motion: motion.rate**3)
 '''
-
-
-@pytest.fixture
-def stage():
-    stage = Stage()
-    yield stage
-    stage.close()
 
 
 @pytest.fixture

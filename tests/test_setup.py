@@ -228,8 +228,11 @@ def test_make_runs(arguments, command):
     assert recipe(*arguments) == [command]
 
 
+TWO_PROCESSES = "-p _hypothesis_pytestplugin -p xdist.plugin -n 2 --dist loadfile"
+
+
 def test_make_test_ends_with_pytest_itself():
-    assert recipe("test", "PYTEST_ARGS=-k noise")[-1].endswith("-m pytest -p _hypothesis_pytestplugin -k noise")
+    assert recipe("test", "PYTEST_ARGS=-k noise")[-1].endswith(f"-m pytest {TWO_PROCESSES} -k noise")
 
 
 def test_ci_is_make_test_and_fails_with_it(tmp_path):

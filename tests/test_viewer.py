@@ -5,8 +5,7 @@ from pathlib import Path
 import helpers_viewer as crash_data
 import numpy as np
 import pytest
-import rerun as rr
-from helpers_viewer import NAMES, column, feed, recorder, rows, series, values_of
+from helpers_viewer import column, feed, recorder, rows, series, values_of
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 from rerun.blueprint.api import Container, View
@@ -14,37 +13,14 @@ from rerun.chunk import RrdReader
 
 from crash_estimator.viewer import layout
 from crash_estimator.viewer.blocks import ParameterBlock, ResidualBlock
-from crash_estimator.viewer.cast import ESTIMATOR_COLORS, MEASURED, Cast, member
+from crash_estimator.viewer.cast import ESTIMATOR_COLORS, MEASURED
 from crash_estimator.viewer.curves import BAND
 from crash_estimator.viewer.loops import HEIGHT, WIDTH
 from crash_estimator.viewer.screenshot import ScreenshotError, main, screenshot
 
 G = 9.80665
 
-
-@pytest.fixture(scope="module", autouse=True)
-def strict():
-    rr.set_strict_mode(True)  # bad input raises instead of being warned of
-    yield
-    rr.set_strict_mode(False)
-
-
-@pytest.fixture(scope="module")
-def crash() -> crash_data.Crash:
-    return crash_data.simulate()
-
-
-@pytest.fixture(scope="module")
-def streams(crash) -> dict[str, list]:
-    return crash_data.two_streams(crash)
-
-
-@pytest.fixture(scope="module")
-def cast(crash, streams) -> Cast:
-    cast = Cast(crash_data.test_block(crash), (crash.time_ns[0] * 1e-9, crash.time_ns[-1] * 1e-9))
-    for name in NAMES:
-        cast = cast.with_member(member(*streams[name][:3]))
-    return cast
+pytestmark = pytest.mark.usefixtures("strict")
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ from pathlib import Path
 import helpers_viewer as crash_data
 import numpy as np
 import pytest
-import rerun as rr
 from helpers_findings import ADDED, candidate, ranking, revision, story
 from helpers_viewer import NAMES, column, feed, recorder, rows, series, settle, values_of
 from numpy.testing import assert_allclose
@@ -25,12 +24,7 @@ from crash_estimator.viewer.revisions import LAGS, whiteness_drawing
 
 G = 9.80665
 
-
-@pytest.fixture(scope="module", autouse=True)
-def strict():
-    rr.set_strict_mode(True)  # bad input raises instead of being warned of
-    yield
-    rr.set_strict_mode(False)
+pytestmark = pytest.mark.usefixtures("strict")
 
 
 @pytest.fixture(scope="module")

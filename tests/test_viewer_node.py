@@ -14,17 +14,21 @@ import numpy as np
 import pytest
 import rclpy
 from crash_msgs import msg
+from helpers_domain import own_domain
+from helpers_waiting import PATIENCE
 from numpy.testing import assert_array_equal
 from rclpy.node import Node
 from rerun.chunk import RrdReader
 
-from crash_estimator.demo.domain import free_domain
+from crash_estimator.demo.children import POLITE
 from crash_estimator.nodes import viewer_messages
 from crash_estimator.viewer.blocks import Block, ForceBlock, ParameterBlock, ResidualBlock
 from crash_replay.qos import LATCHED, STREAM
 from crash_replay.ros_runtime import acknowledge_promptly
 
 NAMES = ("mrls", "ckf")
+SAMPLES = 240
+"""Enough for every view; each comes in three messages of each estimator and takes some 2 ms to be drawn."""
 TOPIC_OF = {ParameterBlock: "parameters", ResidualBlock: "residuals", ForceBlock: "forces"}
 
 
@@ -76,7 +80,7 @@ class Stage(Node):
                 )
 
 
-def wait_until(done: Callable[[], bool], what: str, patience: float = 20.0) -> None:
+def wait_until(done: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
     deadline = time.monotonic() + patience
     while not done():
         assert time.monotonic() < deadline, f"waited {patience:g} s in vain: {what}"
@@ -85,7 +89,7 @@ def wait_until(done: Callable[[], bool], what: str, patience: float = 20.0) -> N
 
 @pytest.fixture
 def stage(monkeypatch) -> Iterator[Stage]:
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(free_domain()))
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(own_domain()))
     acknowledge_promptly()
     rclpy.init()
     node = Stage()
@@ -96,7 +100,7 @@ def stage(monkeypatch) -> Iterator[Stage]:
 
 @pytest.fixture(scope="module")
 def crash() -> crash_data.Crash:
-    return crash_data.simulate(n=600, pre=50)
+    return crash_data.simulate(n=SAMPLES, pre=50)
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +126,11 @@ def end(viewer: subprocess.Popen, timeout: float) -> tuple[str, str]:
     return output, errors
 
 
+def whole(*names: str) -> str:
+    """What is said of estimators that were seen to the end."""
+    return ", ".join(f"{name} {SAMPLES} of {SAMPLES} samples" for name in names)
+
+
 def drawn(rrd: Path, entity: str, component: bytes) -> np.ndarray:
     """A series in order of time."""
     rows = []
@@ -142,8 +151,8 @@ def test_a_signal_ends_it_with_everything_in_the_file(stage, crash, streams, tmp
     stage.play(crash, streams)
     time.sleep(1.5)  # what was sent has arrived; some of it is not in the file yet
     viewer.send_signal(number)
-    output, errors = end(viewer, timeout=8.0)
-    assert output == f"wrote {rrd}: mrls 600 of 600 samples, ckf 600 of 600 samples\n"
+    output, errors = end(viewer, timeout=POLITE)
+    assert output == f"wrote {rrd}: {whole(*NAMES)}\n"
     assert "rerun --connect rerun+http://127.0.0.1:" in errors
     assert f"writing {rrd}" in errors
     assert rrd.read_bytes()[-12:-4] == b"RRF2FOOT"
@@ -157,8 +166,8 @@ def test_it_finds_the_estimators_and_ends_with_the_replay(stage, crash, streams,
     viewer = start(rrd, exit_when_finished="true")
     stage.play(crash, streams)
     stage.state.publish(msg.ReplayState(state=msg.ReplayState.FINISHED))
-    output, _ = end(viewer, timeout=15.0)
-    assert output == f"wrote {rrd}: ckf 600 of 600 samples, mrls 600 of 600 samples\n"
+    output, _ = end(viewer, timeout=PATIENCE)
+    assert output == f"wrote {rrd}: {whole(*sorted(NAMES))}\n"
 
 
 def test_a_window_that_cannot_open_is_said_and_disturbs_nothing(stage, crash, streams, tmp_path, monkeypatch):
@@ -169,24 +178,24 @@ def test_a_window_that_cannot_open_is_said_and_disturbs_nothing(stage, crash, st
     stage.play(crash, streams)
     time.sleep(1.0)
     stage.state.publish(msg.ReplayState(state=msg.ReplayState.FINISHED))
-    output, errors = end(viewer, timeout=15.0)
+    output, errors = end(viewer, timeout=PATIENCE)
     assert "viewer opened on rerun+http://127.0.0.1:" in errors
     assert "could not run; look at it live with: rerun --connect rerun+http://127.0.0.1:" in errors
-    assert "600 of 600" in output
+    assert whole(*NAMES) in output
 
 
 def test_it_ends_at_once_where_nothing_was_played(stage, tmp_path):
     viewer = start(tmp_path / "empty.rrd", estimators="[mrls]")
     wait_until(lambda: stage.out["mrls", "forces"].get_subscription_count() == 1, "the viewer subscribes")
     viewer.send_signal(signal.SIGTERM)
-    output, _ = end(viewer, timeout=5.0)
+    output, _ = end(viewer, timeout=POLITE)
     assert output == ""
 
 
 def test_a_file_that_cannot_be_written_is_one_line(stage, tmp_path):
     (tmp_path / "file").write_text("")
     viewer = start(tmp_path / "file" / "x.rrd")
-    _, errors = viewer.communicate(timeout=20)
+    _, errors = viewer.communicate(timeout=PATIENCE)
     assert viewer.returncode == 1
     complaint = [line for line in errors.splitlines() if not line.startswith("[INFO]")]
     assert len(complaint) == 1

@@ -1,38 +1,18 @@
 """The pieces that the viewer's drawings are made of: axes, figures, blocks, limits, names."""
 
-import helpers_viewer as crash_data
 import numpy as np
 import pytest
-from helpers_viewer import NAMES
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.viewer import cast as cast_module
 from crash_estimator.viewer.axes import axis_for, round_up, text
 from crash_estimator.viewer.blocks import EventBlock, ForceBlock, ParameterBlock, ResidualBlock, join
-from crash_estimator.viewer.cast import ESTIMATOR_COLORS, Cast, member
+from crash_estimator.viewer.cast import ESTIMATOR_COLORS, Cast
 from crash_estimator.viewer.frames import FRAMES, frame_ends
 from crash_estimator.viewer.plausible import PARAMETER, PREDICTION, Limits
 from crash_estimator.viewer.schematic import schematic
 from crash_estimator.viewer.states import States
 from crash_estimator.viewer.summary import with_std
-
-
-@pytest.fixture(scope="module")
-def crash() -> crash_data.Crash:
-    return crash_data.simulate()
-
-
-@pytest.fixture(scope="module")
-def streams(crash) -> dict[str, list]:
-    return crash_data.two_streams(crash)
-
-
-@pytest.fixture(scope="module")
-def cast(crash, streams) -> Cast:
-    cast = Cast(crash_data.test_block(crash), (crash.time_ns[0] * 1e-9, crash.time_ns[-1] * 1e-9))
-    for name in NAMES:
-        cast = cast.with_member(member(*streams[name][:3]))
-    return cast
 
 
 def test_blocks_are_joined_by_estimator_kind_and_run(streams):

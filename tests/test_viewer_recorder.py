@@ -5,34 +5,20 @@ import signal
 import socket
 import subprocess
 import time
+from threading import Event
 
 import helpers_viewer as crash_data
 import numpy as np
 import pytest
-import rerun as rr
 from helpers_viewer import NAMES, feed, recorder, rows, series, settle, two_streams
+from helpers_waiting import PATIENCE
 from rerun.chunk import RrdReader
 
 from crash_estimator.viewer.blocks import ForceBlock, ParameterBlock
 from crash_estimator.viewer.native import viewer_binary
 from crash_estimator.viewer.sinks import usable_port
 
-
-@pytest.fixture(scope="module", autouse=True)
-def strict():
-    rr.set_strict_mode(True)  # bad input raises instead of being warned of
-    yield
-    rr.set_strict_mode(False)
-
-
-@pytest.fixture(scope="module")
-def crash() -> crash_data.Crash:
-    return crash_data.simulate()
-
-
-@pytest.fixture(scope="module")
-def streams(crash) -> dict[str, list]:
-    return crash_data.two_streams(crash)
+pytestmark = pytest.mark.usefixtures("strict")
 
 
 def test_a_killed_viewer_disturbs_nothing(crash, streams, tmp_path):
@@ -69,17 +55,15 @@ def test_a_full_queue_makes_curves_coarser_and_nobody_waits(crash, tmp_path):
     said = []
     target = recorder(tmp_path / "coarse.rrd", limit=600, say=said.append)
     target.put(lambda: crash_data.test_block(crash))
-    target.put(lambda: time.sleep(0.5))  # Rerun is held up, as by a slow disk
-    time.sleep(0.1)
-    longest = 0.0
+    goes_on, gone_on = Event(), []
+    target.put(lambda: gone_on.append(goes_on.wait(PATIENCE)))  # Rerun is held up, as by a slow disk
     for i in range(len(streams["mrls"])):
         for name in NAMES:
-            began = time.perf_counter()
             target.put(lambda block=streams[name][i]: block, stream=(name, type(streams[name][i])))
-            longest = max(longest, time.perf_counter() - began)
     event = crash_data.events(crash, "mrls")[0]
     target.put(lambda: event)
-    assert longest < 0.1
+    assert not gone_on, "nobody has waited for it"
+    goes_on.set()
     settle(target)
     lines = target.close()
     assert target.dropped > 1000

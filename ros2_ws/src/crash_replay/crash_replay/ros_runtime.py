@@ -1,19 +1,24 @@
 """What a node needs of rclpy and the middleware beside its topics."""
 
 import os
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import rclpy
+from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor, ExternalShutdownException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 PROFILES = Path(__file__).with_name("fastdds.xml")
 PROFILES_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
+LOOK = 0.1
+"""s between two looks at whether a signal has come."""
 
 
 def acknowledge_promptly() -> None:
@@ -43,14 +48,25 @@ def run(
     at_fault: what data, model or parameters raise: one line on standard error, exit status 1; close: called at the end.
     """
     acknowledge_promptly()
-    rclpy.init()
+    # A signal must end the node between two callbacks, not take the context away under the executor.
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    signals: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, _: signals.append(number))
     node = None
     try:
         node = make()
-        executor = EventsExecutor()
+        executor, done = EventsExecutor(), until(node)
         executor.add_node(node)
-        spin(executor, until(node))
-    except (KeyboardInterrupt, ExternalShutdownException):
+
+        def look() -> None:
+            if signals and not done.done():
+                done.set_result(None)
+
+        # an idle executor runs no Python, and so no signal handler either
+        node.create_timer(LOOK, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        spin(executor, done)
+    except ExternalShutdownException:
         pass
     except (*at_fault, ParameterException) as error:
         print(f"error: {' '.join(str(error).split())}", file=sys.stderr)

@@ -6,7 +6,6 @@ make demo RECORDING=../data/nhtsa-10146      one of your own: a bag, CSV with YA
 
 import argparse
 import os
-import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -30,6 +29,7 @@ from .choice import (
 )
 from .domain import own_environment
 from .folder import claim
+from .interrupts import interrupt_on_signals
 from .terminal import Terminal, near
 
 PATIENCE_OF_REPLAY = 600.0
@@ -37,15 +37,9 @@ PATIENCE_OF_REPLAY = 600.0
 
 
 def main() -> int:
-    for number in (signal.SIGTERM, signal.SIGHUP):  # as Ctrl-C: what was started is ended
-        signal.signal(number, _interrupt)
-    signal.signal(signal.SIGINT, _interrupt)  # also where a shell without job control has it ignored
+    interrupt_on_signals()  # what was started is ended
     arguments = _parser().parse_args()
     return guarded(lambda: demo(arguments))
-
-
-def _interrupt(*_) -> None:
-    raise KeyboardInterrupt
 
 
 def _parser() -> argparse.ArgumentParser:

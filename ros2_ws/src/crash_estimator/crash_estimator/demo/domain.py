@@ -3,14 +3,15 @@
 import os
 import random
 import socket
+from collections.abc import Sequence
 
 DOMAINS = range(1, 102)
 """Those whose ports stay below Linux's ephemeral ones; 0 is everybody's default."""
 
 
-def free_domain() -> int:
+def free_domain(among: Sequence[int] = DOMAINS) -> int:
     """A domain without a participant on this machine, drawn at random so that two that start at once do not meet."""
-    candidates = random.SystemRandom().sample(DOMAINS, len(DOMAINS))
+    candidates = random.SystemRandom().sample(among, len(among))
     return next((domain for domain in candidates if _is_free(domain)), candidates[0])
 
 

@@ -18,6 +18,7 @@ from ..viewer.findings import RankingBlock
 from ..viewer.native import has_display
 from .children import Child, Children
 from .choice import Choice
+from .interrupts import held_back
 from .story import Story
 from .terminal import Terminal, near
 from .watch import Watch
@@ -97,8 +98,9 @@ class Run:
 
     def _listen(self, watch: Watch, executor: Executor) -> None:
         until = time.monotonic() + PERIOD
-        while (left := until - time.monotonic()) > 0:
-            executor.spin_once(timeout_sec=left)
+        with held_back():
+            while (left := until - time.monotonic()) > 0:
+                executor.spin_once(timeout_sec=left)
         self._tell_of_processes()
         for finding in watch.new_findings() if self.story else ():
             tell = self.story.ranking if isinstance(finding, RankingBlock) else self.story.misfit

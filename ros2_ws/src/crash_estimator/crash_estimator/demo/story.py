@@ -80,7 +80,9 @@ def _lacks(block: RankingBlock) -> list[str]:
     if best is None or best.evidence < FOUND:
         return []
     rivals = f"not told from it here: {_listed(best.confounded_with)}"
-    return [f"what it lacks: {_named(best)}"] + [rivals] * bool(best.confounded_with)
+    share = f"{block.force_explained_before:.0%} -> {block.force_explained_after:.0%}"
+    force = f"share of {block.force} that the inertias explain: {share}"
+    return [f"what it lacks: {_named(best)}"] + [rivals] * bool(best.confounded_with) + [force] * bool(block.force)
 
 
 def _named(one: Candidate) -> str:

@@ -16,7 +16,8 @@ from .system import Body, Element, System
 def frontal_engine_cab() -> Scenario:
     """The masses, K3 and damping of the ready model `frontal_engine_cab`."""
     system = _engine_cab(
-        cab=1319.0, engine=400.0, velocity=13.3, damping=(1000.0, 200.0, 1000.0), cab_engine=Spring(constant(8.0e5), 5.0e6),
+        cab=1319.0, engine=400.0, velocity=13.3, damping=(1000.0, 200.0, 1000.0),
+        cab_engine=Spring(constant(8.0e5), 5.0e6),
         cab_barrier=stepped((0.0, 8.0e5), (0.12, 4.5e5), (0.30, 3.2e5), (0.50, 4.2e5), width=0.02),
         engine_barrier=stepped((0.0, 1.0e5), (0.36, 4.2e5), (0.48, 3.0e5), width=0.02),
         unloading=1.5e7,

@@ -1,0 +1,59 @@
+"""What holds for all tests, and what tests of several files begin with.
+
+The imports are in the fixtures: what needs neither ROS nor the viewer does not wait for them.
+"""
+
+import pytest
+from hypothesis import settings
+
+# an example that takes long does so because the other test process, or somebody else, has the processor
+settings.register_profile("no_deadline", deadline=None)
+settings.load_profile("no_deadline")
+
+
+@pytest.fixture
+def stage():
+    """Estimator nodes in this process, which end with the test."""
+    from helpers_estimator_node import Stage
+
+    stage = Stage()
+    yield stage
+    stage.close()
+
+
+@pytest.fixture(scope="module")
+def strict():
+    """Rerun raises at bad input instead of warning of it."""
+    import rerun as rr
+
+    rr.set_strict_mode(True)
+    yield
+    rr.set_strict_mode(False)
+
+
+@pytest.fixture(scope="module")
+def crash():
+    from helpers_viewer import simulate
+
+    return simulate()
+
+
+@pytest.fixture(scope="module")
+def streams(crash) -> dict[str, list]:
+    """What two estimators say of the crash."""
+    from helpers_viewer import two_streams
+
+    return two_streams(crash)
+
+
+@pytest.fixture(scope="module")
+def cast(crash, streams):
+    """All that is known of the two estimators."""
+    from helpers_viewer import NAMES, test_block
+
+    from crash_estimator.viewer.cast import Cast, member
+
+    cast = Cast(test_block(crash), (crash.time_ns[0] * 1e-9, crash.time_ns[-1] * 1e-9))
+    for name in NAMES:
+        cast = cast.with_member(member(*streams[name][:3]))
+    return cast

@@ -1,0 +1,43 @@
+"""Simulated recordings that several tests look at, each made once, and the command that makes them."""
+
+from functools import cache
+from pathlib import Path
+
+from ruamel.yaml import YAML
+
+from crash_replay.synthesize_command import main
+from crash_replay.synthetic.hidden.cases import HiddenCase, draw_case
+from crash_replay.synthetic.recordings import SCENARIOS
+
+BAGS = Path(__file__).parents[1] / "bags"
+SEED = 11
+
+ideal = cache(lambda name: SCENARIOS[name](ideal=True))
+bundled = cache(lambda name: SCENARIOS[name]())
+
+
+@cache
+def drawn(structure: str, *effects: str, seed: int = SEED, size: float = 1.0) -> HiddenCase:
+    return draw_case(structure, effects, seed, size)
+
+
+@cache
+def recorded(structure: str, *effects: str):
+    """-> recording and truth at 1.1 of the nominal speed, and the truth file read back."""
+    case = drawn(structure, *effects)
+    recording, truth = case.record(1.1)
+    return recording, truth, YAML(typ="safe", pure=True).load(case.truth_text(truth))
+
+
+def model_of(case: HiddenCase) -> dict:
+    return YAML(typ="safe", pure=True).load(case.model_text)
+
+
+def synthesize(monkeypatch, *arguments: str) -> int:
+    """The command's exit status."""
+    monkeypatch.setattr("sys.argv", ["synthesize", *arguments])
+    try:
+        main()
+    except SystemExit as ended:
+        return ended.code
+    return 0
