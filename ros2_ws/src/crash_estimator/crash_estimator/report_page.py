@@ -46,6 +46,8 @@ def write_report(
     effects: Mapping[str, Effect] = EFFECTS,
 ) -> Path:
     """Write `report.md` and its figures into the folder -> the page. The settings go to the methods that have them."""
+    if not ((recording.time > 0.0) & (recording.time <= end)).any():
+        raise ModelError(f"test {recording.test.id} has no samples between the impact and {end:g} s")
     folder.mkdir(parents=True, exist_ok=True)
     page = [f"# {recording.test.title or recording.test.id}", "", *_test(recording, structure, end), ""]
     page += _missing(recording, structure, end, effects)
@@ -67,8 +69,6 @@ def _estimated(
 ) -> Result:  # fmt: skip
     estimator = make_estimator(structure, recording.test, method, effects=effects, **settings)
     estimates = run(estimator, (sample for sample in recording.samples() if sample.time <= end))
-    if not any(estimate.time_ns > 0 for estimate in estimates):
-        raise ModelError(f"test {recording.test.id} has no samples between the impact and {end:g} s")
     return Result(estimator.description, estimates, validate(structure, estimator.description, estimates))
 
 

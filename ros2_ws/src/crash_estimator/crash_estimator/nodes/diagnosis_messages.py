@@ -55,6 +55,9 @@ def ranking_message(at: Moment, answer: LiveAnswer) -> Ranking:
         whiteness_after=after.probability,
         free_run_before=answer.free_run.before,
         free_run_after=answer.free_run.after,
+        force=answer.force,
+        force_explained_before=answer.force_explained.before,
+        force_explained_after=answer.force_explained.after,
     )
 
 

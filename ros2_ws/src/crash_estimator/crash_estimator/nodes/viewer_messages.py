@@ -73,6 +73,9 @@ def ranking_block(message: Ranking) -> RankingBlock:
         message.white_after,
         message.free_run_before,
         message.free_run_after,
+        message.force,
+        message.force_explained_before,
+        message.force_explained_after,
     )
 
 

@@ -50,6 +50,9 @@ class RankingBlock(NamedTuple):
     white_after: bool = False
     free_run_before: float = np.nan  # m/s^2
     free_run_after: float = np.nan
+    force: str = ""  # channel of the measured force, where the share that all inertias explain is known
+    force_explained_before: float = np.nan  # 0 to 1
+    force_explained_after: float = np.nan
 
 
 class Window(NamedTuple):
