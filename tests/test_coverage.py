@@ -23,6 +23,7 @@ CASES = {  # method, its settings, repetitions, colour of the noise (d, a)
     "rls that forgets nothing": ("rls", {"forgetting": 1.0}, 400, None),
     "mrls": ("mrls", {}, 200, None),
     "mrls of table 5.2": ("mrls", {"memory": 0.01, "error_limit": 1.0, "step_limit": 0.5}, 300, None),
+    "mrls that goes back at one sigma": ("mrls", {"error_limit": 1.0}, 300, None),
     "kalman": ("kalman", {}, 400, None),
     "constrained_kalman": ("constrained_kalman", {}, 400, None),
     "gauss_newton": ("gauss_newton", {"p": 1, "q": 1, "forgetting": 1.0, "noise_memory": 1e3}, 60, ([-0.6], [0.3])),

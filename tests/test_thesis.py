@@ -18,28 +18,37 @@ def test_mrls_leaves_the_noise_and_rls_more(case, settings):
     assert (rls > 1.3 * mrls).sum() >= 2, rls / mrls
 
 
-def test_the_dummy_leaves_the_noise_and_no_more():
-    """Table 6.1: diagonal 0.8 to 1.25, off it under 0.2 of the diagonal."""
-    ratio = np.median(dummy(seeds=5).ratio, axis=0)
+@pytest.mark.parametrize("offsets", [False, True])
+def test_the_dummy_leaves_the_noise_and_no_more(offsets):
+    """Table 6.1: diagonal 0.8 to 1.25, off it under 0.2 of the diagonal; as in the thesis, and as we do by default."""
+    ratio = np.median(dummy(seeds=9, offsets=offsets).ratio, axis=0)
     diagonal = np.diag(ratio)
     assert ((diagonal > 0.8) & (diagonal < 1.25)).all(), ratio
     assert np.abs(ratio - np.diag(diagonal)).max() < 0.2 * diagonal.min()
 
 
 @pytest.mark.parametrize("which", cases.CHAPTER_4)
-def test_a_noise_model_whitens_the_residual_and_leaves_the_stiffness(which):
-    """4.5.1: K/M with p,q = 0,0 and 1,2 within their sigmas; white at 95 % only with the latter. Medians of 20."""
+def test_a_noise_model_leaves_the_stiffness_and_takes_most_of_the_autocorrelation(which):
+    """4.5.1 with its sine: K/M with p,q = 0,0 and 1,2 within their sigmas; Q, and the lags beyond the limit, fall.
+
+    That 1,2 leaves no more than white noise cannot be asked: a sine is no ARMA(1,2), see docs/thesis.md.
+    """
     found = noise_orders(which, seeds=20)
-    # sigma is that of noise alone, K/M changes all the time: at two sigma, and not at every sample
-    assert np.median(found.apart) < 1.96 and np.median(found.within) > 0.6
+    assert np.median(found.apart) < 1.0 and np.median(found.within) > 0.85
+    assert np.median(found.rms[1, 2]) < np.median(found.rms[0, 0])
     assert not found.white[0, 0].any()
-    assert np.mean(found.white[1, 2]) >= 0.5  # no ARMA(1,2) leaves a sine white, see docs/thesis.md
+    assert np.median(found.q[1, 2]) < 0.2 * np.median(found.q[0, 0])
+    assert np.median(found.inside[1, 2]) > 0.8 > 0.6 > np.median(found.inside[0, 0])
 
 
 @pytest.mark.parametrize("which", cases.CHAPTER_4)
 def test_noise_of_the_model_s_kind_is_left_white(which):
-    """A white residual passes at 95 % in 95 % of repetitions; of 20, fewer than 17 would be so in 2 % of the cases."""
+    """4.12, e is ARMA(1,2): K/M within their sigmas, white at 95 % with 1,2 and never with 0,0.
+
+    A white residual passes at 95 % in 95 % of repetitions; of 20, fewer than 17 would be so in 2 % of the cases.
+    """
     found = noise_orders(which, seeds=20, noise=cases.arma)
+    assert np.median(found.apart) < 1.0 and np.median(found.within) > 0.85
     assert np.mean(found.white[1, 2]) >= 0.85 and not found.white[0, 0].any()
 
 

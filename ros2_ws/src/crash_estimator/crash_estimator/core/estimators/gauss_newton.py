@@ -74,6 +74,7 @@ class GaussNewton:
     memory: float = 0.005  # s, as in RLS
     noise_memory: float = 0.1  # s: of d and a, which are those of the whole record
     known_to: float = 0.03  # d and a wait until theta adds less than this share of the noise variance; inf: they do not
+    start: tuple[NoiseModel, ...] = ()  # one for each equation, of an earlier pass or an alike test; (): white
 
     def __post_init__(self):
         for name in ("p", "q"):
@@ -83,6 +84,8 @@ class GaussNewton:
                     raise ModelError(
                         f"order {name} of gauss_newton must be a whole number from 0 to {LONGEST}, got {order!r}"
                     )
+        if not isinstance(self.start, tuple):
+            raise ModelError(f"start of gauss_newton is a tuple of noise models, one for each equation, got {self.start!r}")
 
     def orders(self, equations: int) -> list[tuple[int, int]]:
         """(p, q) of each equation."""
@@ -100,7 +103,25 @@ class GaussNewton:
 
     def init(self, equations: int) -> GaussNewtonState:
         without = [p + q == 0 for p, q in self.orders(equations)]
-        return GaussNewtonState(self._rls(equations).init(equations), (), np.array(without))
+        rls = self._rls(equations).init(equations)
+        if not self.start:
+            return GaussNewtonState(rls, (), np.array(without))
+        if [(len(model.d), len(model.a)) for model in self.start] != self.orders(equations):
+            raise ModelError(f"start of gauss_newton must be one noise model of orders p, q for each of {equations} equations")
+        return GaussNewtonState(self._begun(rls), (), np.full(equations, True))
+
+    def _begun(self, rls: RlsState) -> RlsState:
+        """With the noise models known before: d, a, their covariance and the variance of eps."""
+        theta, information, carried = rls.theta.copy(), rls.information.copy(), rls.carried.copy()
+        for (d, a), model in zip(self._slices(len(self.start)), self.start):
+            both = slice(d.start, a.stop)
+            theta[d], theta[a], carried[both, both] = model.d, model.a, model.covariance
+            information[both, both] = np.linalg.inv(model.covariance)
+        variance = np.array([model.variance for model in self.start])
+        return rls._replace(
+            theta=theta, information=information, carried=carried,
+            error_covariance=np.diag(variance), residual_variance=variance,
+        )  # fmt: skip
 
     def update(self, state: GaussNewtonState, regression: Regression) -> tuple[GaussNewtonState, Update]:
         equations, parameters = regression.gradient.shape

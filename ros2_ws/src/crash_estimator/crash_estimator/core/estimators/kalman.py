@@ -10,8 +10,12 @@ is optimal, so its running mean over `noise_memory` estimates what the model can
 
 Crush is integrated twice from accelerations whose zero is known no better than the mean of n noisy samples, so
 that a stiff element's force is wrong by K b t^2 / 2. With `offsets` these errors b, one for each measured body, are
-considered (Schmidt): they have their part in P and in the gain, so that the parameters' covariance knows of them,
-but they are not estimated, because they would soak up whatever else the model lacks.
+estimated with theta, from 0 and within what the pre-impact noise lets them be:
+
+    y = Psi theta + H b + e,    b ~ (0, noise / n)
+
+Without them a stiffness bends to explain b, and its sigma is too small; to consider b (Schmidt) and leave it unestimated
+keeps the sigma right, but leaves K b t^2 / 2 in the residual.
 """
 
 from dataclasses import dataclass
@@ -29,6 +33,7 @@ SMALLEST_SHARE = 0.05
 class KalmanState(NamedTuple):
     theta: np.ndarray  # (p,)
     covariance: np.ndarray  # (p, p), or (p + b, p + b) once the offsets' errors have joined
+    offsets: np.ndarray  # (b,) m/s^2, the zero offsets' errors; empty until they have joined
     noise: np.ndarray  # (q,) variance of each equation's error, R2; NaN until the first update
 
 
@@ -39,44 +44,49 @@ class Kalman:
     settings: Theta
     constrained: bool = True  # keep the parameters' bounds
     noise_memory: float = 0.005  # s over which R2 adapts; 0 keeps the noise known before the impact
-    offsets: bool = True  # consider the errors of the zero offsets
+    offsets: bool = True  # estimate the errors of the zero offsets with theta
 
     def init(self, equations: int) -> KalmanState:
-        return KalmanState(self.settings.initial, np.diag(self.settings.std**2), np.full(equations, np.nan))
+        return KalmanState(self.settings.initial, np.diag(self.settings.std**2), np.zeros(0), np.full(equations, np.nan))
 
     def update(self, state: KalmanState, regression: Regression) -> tuple[KalmanState, Update]:
         theta, noise, p = state.theta, self._noise(state, regression), len(state.theta)
-        covariance, gradient = state.covariance, regression.gradient
+        covariance, gradient, offsets = state.covariance, regression.gradient, state.offsets
         if self.offsets:
             if len(covariance) == p:
                 covariance = _with_offsets(covariance, regression.offset_variance)
+                offsets = np.zeros(len(covariance) - p)
             gradient = np.hstack([gradient, regression.offset_gradient])
-        considered = np.ones(len(covariance) - p, dtype=bool)
-        prior = covariance + np.diag(self._walk(theta, regression, len(considered)))
+        always = np.ones(len(offsets), dtype=bool)
+        prior = covariance + np.diag(self._walk(theta, regression, len(offsets)))
         target = regression.measured - regression.known
         equations = [(psi, y, r) for psi, y, r in zip(gradient, target, noise) if not np.isnan(y)]
 
         def assimilate(theta: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             """The equations' errors are independent, so they update in turn, each with a scalar to divide by."""
-            covariance = prior
-            seen, moved = np.concatenate([free, considered]), np.concatenate([free, ~considered])
+            covariance, both = prior, np.concatenate([theta, offsets])
+            moved = np.concatenate([free, always])
             for psi_all, y, r in equations:
-                psi = np.where(seen, psi_all, 0.0)
+                psi = np.where(moved, psi_all, 0.0)
                 spread = covariance @ psi
                 gain = np.where(moved, spread / (r + psi @ spread), 0.0)
-                theta = theta + gain[:p] * (y - psi_all[:p] @ theta)
+                both = both + gain * (y - psi_all @ both)
                 lessen = np.eye(len(prior)) - np.outer(gain, psi)
                 covariance = lessen @ covariance @ lessen.T + r * np.outer(gain, gain)
-            return theta, 0.5 * (covariance + covariance.T)
+            return both, 0.5 * (covariance + covariance.T)
 
         bounds = self.settings if self.constrained else self.settings._replace(lower=-np.inf, upper=np.inf)
-        updated, clamped = within_bounds(lambda t, free: assimilate(t, free)[0], theta, regression.active, bounds)
+        updated, clamped = within_bounds(lambda t, free: assimilate(t, free)[0][:p], theta, regression.active, bounds)
         held = np.where(clamped, updated, theta)
-        covariance = assimilate(held, regression.active & ~clamped)[1]
+        both, covariance = assimilate(held, regression.active & ~clamped)
         innovation_covariance = np.diag(noise) + gradient @ prior @ gradient.T
-        products = (target - regression.gradient @ updated) * (target - regression.gradient @ theta)
-        state = KalmanState(updated, covariance, self._adapt(noise, products, regression))
-        return state, Update(updated, covariance[:p, :p], innovation_covariance, clamped)
+        expected, expected_after = gradient[:, p:] @ offsets, gradient[:, p:] @ both[p:]
+        residual = target - regression.gradient @ updated - expected_after
+        products = residual * (target - regression.gradient @ theta - expected)
+        state = KalmanState(updated, covariance, both[p:], self._adapt(noise, products, regression))
+        return state, Update(
+            updated, covariance[:p, :p], innovation_covariance, clamped, expected_error=(expected, expected_after)
+        )
 
     def _walk(self, theta: np.ndarray, regression: Regression, extra: int) -> np.ndarray:
         size = np.maximum(np.abs(theta), SMALLEST_SHARE * self.settings.scale)
