@@ -10,8 +10,9 @@ from .qos import STREAM
 NOT_WAITING = Duration(seconds=0)
 ON_TIME = 4000
 """Messages that may be on their way while the clock is kept: below the 5000 that a publisher holds by default."""
-LATE = 500
-"""Messages that may be on their way when there is no clock to keep: enough to keep all of them busy."""
+LATE = 80
+"""Messages that may be on their way when there is no clock to keep: enough to keep all of them busy. With every
+heartbeat Fast DDS searches what a reader holds: at 500 that takes longer than what is done with a message."""
 BYTES = 250_000
 """Bytes that may be on their way: half of what Fast DDS holds between processes; what exceeds it is sent again."""
 PATIENCE = 10.0
