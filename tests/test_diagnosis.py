@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from crash_estimator.core.diagnosis.candidates import candidates
 from crash_estimator.core.diagnosis.diagnosis import Diagnosis, diagnose
+from crash_estimator.core.diagnosis.model import fit_model
 from crash_estimator.core.diagnosis.noise import sensor_noise
+from crash_estimator.core.diagnosis.normal import may_diverge
+from crash_estimator.core.diagnosis.records import make_record
+from crash_estimator.core.diagnosis.scales import make_scales
+from crash_estimator.core.diagnosis.screening import screen
 from crash_estimator.core.diagnosis.whiteness import whiteness
+from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.structure import EffectSpec, ModelError, Structure
 from crash_estimator.model_file import ModelFile
 from crash_replay.recording import Recording, RecordingError
@@ -55,6 +62,34 @@ def test_a_planted_effect_is_found_and_the_error_falls_to_the_noise(structure, e
     assert found.residual_rms.after < 1.06 * found.residual_rms.noise_floor < found.residual_rms.before
     assert found.free_run_rms.after < found.free_run_rms.before
     assert found.misfit and len(found.misfit_after) < len(found.misfit)
+
+
+def test_the_mass_of_an_unmodelled_body_is_beside_those_of_the_model_where_no_force_tells():
+    """Halving every mass and force leaves a motion as it is: it would come out lighter by its share of the host's."""
+    for seed in (406, 409, 411):
+        found = diagnosed("impactor", "unmodelled_body", seed=seed).steps[0]
+        (hidden,) = case("impactor", "unmodelled_body", seed=seed)[2]
+        assert abs(found.coefficient - hidden.coefficient) < 3.0 * found.std
+
+
+def test_a_delayed_channel_is_at_rest_until_the_impact_has_reached_it():
+    """The door's force jumps at time zero: the first samples say how late the channel is, to a fraction of a step."""
+    found = diagnosed("side", "channel_delay", seed=303).steps[0]
+    (hidden,) = case("side", "channel_delay", seed=303)[2]
+    assert (found.effect, found.target) == ("channel_delay", hidden.target)
+    assert abs(found.coefficient - hidden.coefficient) < 3.0 * found.std < 1e-4
+
+
+def test_along_a_motion_without_bounds_nothing_is_screened():
+    model, recordings, _ = case("impactor", "viscous_damping")
+    records = [make_record(model, recording) for recording in recordings]
+    scales = make_scales(model, records, 12)
+    fitted = fit_model(model, records, scales, ()).fit
+    every = candidates(model, scales, EFFECTS, ())
+    assert screen(records, scales, (), every, None, fitted)
+    lost = fitted._replace(trajectories=tuple(t._replace(a=np.full_like(t.a, np.inf)) for t in fitted.trajectories))
+    with may_diverge:
+        assert screen(records, scales, (), every, None, lost) == []
 
 
 @pytest.mark.parametrize("structure", ["impactor", "single", "frontal"])

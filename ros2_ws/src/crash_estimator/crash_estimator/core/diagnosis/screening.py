@@ -15,7 +15,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_solve
+from scipy.linalg import LinAlgError, cho_solve
 from scipy.special import log_ndtr
 
 from ..effects.base import Gap, UnloadingSlope
@@ -42,7 +42,7 @@ def screen(
     records: Sequence[Record], scales: Scales, present: Sequence[Addition], additions: Sequence[Addition],
     roughness=None, fitted: Fit | None = None,
 ) -> list[Screened]:  # fmt: skip
-    """All additions to a model that has those that are present; best first.
+    """All additions to a model that has those that are present; best first. Empty where the motion has no bounds.
 
     fitted: that model's fit, along whose trajectory to linearise instead of the measured motion.
     """
@@ -64,7 +64,10 @@ def screen(
     normal, _ = normal_equations(wide, records, start, moved, switched=switched)
 
     small = normal._replace(matrix=normal.matrix[np.ix_(where, where)], vector=normal.vector[where])
-    step = solve(base, small, theta)
+    try:
+        step = solve(base, small, theta)
+    except LinAlgError:  # a fit that ended in a motion without bounds: nothing can be said along it
+        return []
     factor, free = step.factor, step.free
     scale = step.scale[free]
     tried = np.concatenate([coefficients, wide.size + np.arange(len(laws))])

@@ -166,8 +166,8 @@ class _Search:
 
     def reached_the_floor(self) -> bool:
         """The best so far leaves nothing but noise."""
-        best = self.ranking()[0]
-        return best.fit is not None and best.gain > GAIN and assess(best.fit, self.records).whiteness.white
+        best = next(iter(self.ranking()), None)
+        return best is not None and best.fit is not None and best.gain > GAIN and assess(best.fit, self.records).whiteness.white
 
     def ranking(self) -> list[Tried]:
         """Fitted ones first: a screened gain is an estimate, and does not rank above a fit."""
