@@ -54,6 +54,7 @@ class Stage:
         self.heard: dict[str, dict[str, list]] = {}
 
     def close(self) -> None:
+        self.executor.shutdown()
         for node in (*self.diagnoses, self.node):
             node.destroy_node()
         rclpy.shutdown()

@@ -64,6 +64,7 @@ class Stage:
         for process in self.processes:
             process.terminate()
             process.wait(60)
+        self.executor.shutdown()
         for node in (*self.estimators, self.node):
             node.destroy_node()
         rclpy.shutdown()

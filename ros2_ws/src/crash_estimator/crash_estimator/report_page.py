@@ -275,23 +275,13 @@ def _masses(recording: Recording, structure: Structure, folder: Path, end: float
         return []
     estimates = run(estimator, (sample for sample in recording.samples() if sample.time <= end))
     names, last = estimator.description.parameters, estimates[-1]
-    lines = [
-        Line(
-            _time(estimates), _column(estimates, "parameters", k), name, spread=np.array([e.std[k] for e in estimates])
-        )
-        for k, name in enumerate(names)
-    ]
+    time, sigma = _time(estimates), partial(_column, estimates, "std")
+    lines = [Line(time, _column(estimates, "parameters", k), n, spread=sigma(k)) for k, n in enumerate(names)]
     top = 2.0 * float(last.parameters.sum())
     draw(folder / "masses.png", [Panel("effective masses", "time in ms", "kg", lines, y_range=(0.0, top))], columns=1)
     found = ", ".join(f"{name} {m:.0f} +- {s:.0f} kg" for name, m, s in zip(names, last.parameters, last.std))
-    return [
-        "## Effective masses (figures 4.12, 4.26)",
-        "",
-        f"{found}; together {last.parameters.sum():.0f} kg.",
-        "",
-        "![masses](masses.png)",
-        "",
-    ]
+    page = ["## Effective masses (figures 4.12, 4.26)", "", f"{found}; together {last.parameters.sum():.0f} kg.", ""]
+    return [*page, "![masses](masses.png)", ""]
 
 
 def _time(estimates: Sequence[Estimate]) -> np.ndarray:

@@ -156,6 +156,7 @@ def record(node: RecordNode) -> int:
         print(write(node.recorder, node.file), flush=True)
         return 0
     finally:
+        executor.shutdown()
         node.destroy_node()
 
 

@@ -53,10 +53,10 @@ def run(
     signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: signals.append(number))
-    node = None
+    node, executor = None, EventsExecutor()
     try:
         node = make()
-        executor, done = EventsExecutor(), until(node)
+        done = until(node)
         executor.add_node(node)
 
         def look() -> None:
@@ -72,6 +72,7 @@ def run(
         print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
         return 1
     finally:
+        executor.shutdown()  # before the node: it holds the node's events, and a late end of it crashes the process
         if node is not None:
             close(node)
             node.destroy_node()

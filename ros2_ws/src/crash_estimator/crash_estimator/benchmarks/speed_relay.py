@@ -75,6 +75,7 @@ def main() -> int:
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
+        executor.shutdown()
         rclpy.try_shutdown()
     return 0
 

@@ -74,6 +74,7 @@ class Run:
             self._wait_for_viewer()
         finally:
             self.terminal.clear()
+            executor.shutdown()  # before the node: it still holds the node's events, and lets go of them last
             watch.destroy_node()
             rclpy.shutdown()
         return 1 if self.dead & {"replay", "diagnosis"} or self.gave_up or not self._alive() else 0
@@ -184,10 +185,11 @@ class Run:
                 f"\n{name}: model {choice.model}, method {choice.method}, {followed.samples} samples, {lost} lost\n"
             )
             found = followed.found()
-            if found is None:
-                self.terminal.say("nothing was estimated")
-                continue
-            self.terminal.say(f"{parameter_table(*found)}\n\n{error_table(equation_errors(*found))}")
+            errors = equation_errors(*found) if found else []
+            if any(error.samples for error in errors):
+                self.terminal.say(f"{parameter_table(*found)}\n\n{error_table(errors)}")
+            else:
+                self.terminal.say("nothing of the impact was estimated")
 
     def _wait_for_viewer(self) -> None:
         viewer: Child | None = self.children.get("viewer")
