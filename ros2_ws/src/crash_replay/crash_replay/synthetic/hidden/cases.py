@@ -76,7 +76,9 @@ def draw_case(
         if hidden:
             return HiddenCase(seed, *hidden)
     wanted = ", ".join(f"{e} on {at[e]}" if e in at else e for e in effects)
-    raise RecordingError(f"{wanted} shows in none of {DRAWS} draws of structure {structure} with seed {seed}: try another")
+    raise RecordingError(
+        f"{wanted} shows in none of {DRAWS} draws of structure {structure} with seed {seed}: try another"
+    )
 
 
 def _check(structure: str, effects: Sequence[str], at: Mapping[str, str]) -> None:

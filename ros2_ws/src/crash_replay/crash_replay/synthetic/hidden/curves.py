@@ -17,7 +17,7 @@ def straight(stiffness: float) -> Curve:
 
 
 def random_curve(rng: np.random.Generator, stiffness: float, crush: float) -> Curve:
-    """A rising force that reaches `stiffness` times `crush` (m) there and goes on at its mean slope; smooth or abrupt."""
+    """A rising force that is `stiffness` times `crush` (m) there and goes on at its mean slope; smooth or abrupt."""
     parts = int(rng.integers(3, 7))
     lengths = rng.uniform(0.5, 1.5, parts)
     slopes = np.exp(rng.normal(0.0, 0.45, parts))

@@ -13,8 +13,8 @@ Left out, because no method could name them from what is recorded:
 - `load_path` in a structure whose bodies are all joined already;
 - a `clearance` or other law with which the element hardly carries any more: no stiffness at all then does as well;
 - whatever moves the recorded accelerations and forces by less than SHOWS in all, beside the other effects hidden;
-- what is outside the vocabulary in name only: by less than SHOWS_OUTSIDE from the nearest effect inside, such as a mass that
-  has grown before the body is pushed. It is more than SHOWS because several effects together come nearer than one.
+- what is outside the vocabulary in name only: by less than SHOWS_OUTSIDE from the nearest effect inside, such as a mass
+  that has grown before the body is pushed. It is more than SHOWS because several effects together come nearer than one.
 """
 
 import numpy as np

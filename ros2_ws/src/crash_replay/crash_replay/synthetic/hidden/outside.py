@@ -86,7 +86,8 @@ OUTSIDE: Mapping[str, Hide] = {hide.__name__: hide for hide in (rotation, timed_
 
 
 def _channel_of(specimen: Specimen, body: str) -> str:
-    return next(s.channel.name for s in specimen.scenario.sensors if s.of == body and s.channel.quantity == "acceleration")
+    sensors = specimen.scenario.sensors
+    return next(s.channel.name for s in sensors if s.of == body and s.channel.quantity == "acceleration")
 
 
 def _discrete(a, b, c, d, dt: float):

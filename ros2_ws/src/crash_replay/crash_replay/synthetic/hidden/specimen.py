@@ -60,7 +60,10 @@ class Specimen:
         return self.with_parts(sensors=sensors)
 
     def with_parts(
-        self, bodies: list[Body] | None = None, elements: list[Element] | None = None, sensors: list[Sensor] | None = None
+        self,
+        bodies: list[Body] | None = None,
+        elements: list[Element] | None = None,
+        sensors: list[Sensor] | None = None,
     ) -> "Specimen":
         old = self.scenario
         system = replace(
@@ -88,10 +91,11 @@ def peaks_of(specimen: Specimen) -> Peaks:
     names, bodies = [e.name for e in system.elements], [b.name for b in system.bodies]
     force = np.max([np.abs(run.force).max(0) for run in runs], axis=0)
     drop = np.max([1.0 - run.force[-20:].min(0) / np.maximum(run.force.max(0), 1.0) for run in runs], axis=0)
+    travel = np.max([np.abs(run.crush * (run.force != 0.0)).max(0) for run in runs], axis=0)
     return Peaks(
         force=dict(zip(names, force.tolist())),
         crush=dict(zip(names, np.max([run.crush.max(0) for run in runs], axis=0).tolist())),
-        travel=dict(zip(names, np.max([np.abs(run.crush * (run.force != 0.0)).max(0) for run in runs], axis=0).tolist())),
+        travel=dict(zip(names, travel.tolist())),
         rate=dict(zip(names, np.max([np.abs(run.rate * (run.force != 0.0)).max(0) for run in runs], axis=0).tolist())),
         drop=dict(zip(names, drop.tolist())),
         acceleration=dict(zip(bodies, np.max([np.abs(run.acceleration).max(0) for run in runs], axis=0).tolist())),

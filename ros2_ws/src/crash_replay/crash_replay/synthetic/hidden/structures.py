@@ -63,7 +63,8 @@ def single(rng: np.random.Generator) -> Specimen:
     """One mass on a barrier with load cells."""
     bodies = (Body("car", _about(rng, 1719.0), 13.0), Body("barrier"))
     parts = (Part("car_barrier", ("car", "barrier"), 5e5, 0.7, crushed=True, tension=False),)
-    return _specimen(rng, "single", bodies, parts, "x", 0.11, host="car", stop=("barrier", float(rng.uniform(0.2, 0.4))))
+    stop = ("barrier", float(rng.uniform(0.2, 0.4)))
+    return _specimen(rng, "single", bodies, parts, "x", 0.11, host="car", stop=stop)
 
 
 def dummy(rng: np.random.Generator) -> Specimen:
@@ -134,7 +135,8 @@ def _specimen(
         "elements": {e.name: model_element(e, t, part.stiffness) for e, t, part in zip(elements, told, parts)},
     }
     if measured:
-        model["elements"][parts[0].name] |= {"displacement": measured[0].channel.name, "velocity": measured[1].channel.name}
+        displacement, velocity = (sensor.channel.name for sensor in measured)
+        model["elements"][parts[0].name] |= {"displacement": displacement, "velocity": velocity}
     return Specimen(scenario, model, host, pairs, stop)
 
 

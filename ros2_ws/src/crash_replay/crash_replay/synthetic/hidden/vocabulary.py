@@ -75,7 +75,8 @@ def bottoming_out(specimen, peaks, target, share, rng):
     """At half to three quarters of the crush; four times `share` as stiff as the element."""
     stop = float(rng.uniform(0.5, 0.75) * peaks.crush[target])
     c = 4.0 * share * peaks.force[target] / peaks.crush[target]
-    return _parallel(specimen, target, laws.bottoming_out(c, stop)), Hidden("bottoming_out", target, c, "N/m", {"stop": stop})
+    hidden = Hidden("bottoming_out", target, c, "N/m", {"stop": stop})
+    return _parallel(specimen, target, laws.bottoming_out(c, stop)), hidden
 
 
 def clearance(specimen, peaks, target, share, rng):
@@ -141,13 +142,15 @@ def channel_delay(specimen, peaks, target, share, rng):
 def channel_gain(specimen, peaks, target, share, rng):
     """3 to 9 % for a nominal share."""
     gain = 0.26 * share * float(rng.choice([-1.0, 1.0]))
-    return _distorted(specimen, target, lambda time, signal: (1.0 + gain) * signal), Hidden("channel_gain", target, gain, "")
+    hidden = Hidden("channel_gain", target, gain, "")
+    return _distorted(specimen, target, lambda time, signal: (1.0 + gain) * signal), hidden
 
 
 def channel_offset(specimen, peaks, target, share, rng):
     """1.6 to 4.6 g for a nominal share."""
     offset = 13.0 * G * share * float(rng.choice([-1.0, 1.0]))
-    return _distorted(specimen, target, lambda time, signal: signal + offset), Hidden("channel_offset", target, offset, "m/s^2")
+    hidden = Hidden("channel_offset", target, offset, "m/s^2")
+    return _distorted(specimen, target, lambda time, signal: signal + offset), hidden
 
 
 VOCABULARY: Mapping[str, Hide] = {
