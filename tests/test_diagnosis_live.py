@@ -11,8 +11,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from crash_estimator.core.diagnosis import live, live_candidates
 from crash_estimator.core.diagnosis.coarse import MOST_STEPS, coarsened
 from crash_estimator.core.diagnosis.diagnosis import diagnose
+from crash_estimator.core.diagnosis.fit import COARSE, CONVERGED
 from crash_estimator.core.diagnosis.live import LiveDiagnosis
 from crash_estimator.core.diagnosis.live_answer import LiveAnswer, final_answer
+from crash_estimator.core.diagnosis.live_candidates import ITERATIONS_ON
 from crash_estimator.core.diagnosis.records import make_record
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.structure import EffectSpec
@@ -134,6 +136,27 @@ def test_an_update_fits_four_models_at_most(damped, monkeypatch):
     state, _ = hurried.update(state, so_far(recording, 0.085))
     hurried.update(state, recording)
     assert len(fits) <= 2 * 3, "out of time, it leaves a leader to the next update"
+
+
+@pytest.mark.parametrize("structure, effect, seed", [("side", "", 8120), ("impactor", "quadratic_damping", 8103)])
+def test_a_fit_that_goes_on_from_the_last_update_ends_where_one_begun_afresh_does(structure, effect, seed, monkeypatch):
+    fits = []
+    fit = live.fit
+    monkeypatch.setattr(live, "fit", lambda *a, **k: fits.append(fit(*a, **k)) or fits[-1])
+    _, model, recording = hidden_case(structure, effect, seed)
+    diagnosis = LiveDiagnosis(model, recording.test)
+    state = diagnosis.init()
+    for end in (0.030, 0.035):
+        state, _ = diagnosis.update(state, so_far(recording, end))
+    for end in (0.040, 0.045, 0.050):
+        seen = so_far(recording, end)
+        diagnosis.update(diagnosis.init(), seen)
+        state, _ = diagnosis.update(state, seen)
+        afresh, on = fits[-2:]
+        # each has converged when an iteration changes its cost, twice the nats, by less than CONVERGED or COARSE of it
+        assert abs(on.evidence - afresh.evidence) < CONVERGED + COARSE * afresh.cost
+        assert on.iterations <= ITERATIONS_ON < afresh.iterations + 1
+        assert_allclose(on.trajectories[0].x[-1], afresh.trajectories[0].x[-1], atol=1e-3)
 
 
 def test_an_update_is_the_same_again_and_changes_nothing_that_it_was_given(damped):

@@ -91,7 +91,9 @@ def stated(place: Place, fitted: Fit) -> tuple[float, float, dict[str, float]]:
     if not np.isfinite(gradient).all():  # next to nothing, stated as one over it
         return value(at), np.inf, shapes
     variance = float(np.array(gradient) @ covariance[np.ix_(parameters, parameters)] @ np.array(gradient))
-    return value(at), float(abs(value(at)) * np.expm1(np.sqrt(max(variance, 0.0)) / abs(value(at)))), shapes
+    with np.errstate(over="ignore"):  # of next to nothing, known to many powers of ten: inf
+        factor = np.expm1(np.sqrt(max(variance, 0.0)) / abs(value(at)))
+    return value(at), float(abs(value(at)) * factor), shapes
 
 
 def place_of(layout: Layout, tried: Tried) -> Place:
@@ -152,7 +154,7 @@ def _force_explained(before: Fit, after: Fit, records: Sequence[Record]) -> dict
     measured = {output.body for output in layout.outputs if not output.fixed}
     if len(fixed) != 1 or measured != {k for k, body in enumerate(layout.structure.bodies) if body.free}:
         return {}
-    periods = [float(np.median(np.diff(record.time[record.at]))) for record in records]
+    periods = [record.period for record in records]
     if max(periods) * SLOWEST > 1.0:
         return {}
     before_, after_ = (

@@ -17,8 +17,7 @@ MOST_STEPS = 160
 def coarsened(record: Record) -> Record:
     """The record in bins; itself where its samples are no closer than the bins would be."""
     time = record.time[record.at]
-    period = float(np.median(np.diff(time)))
-    per_bin = int(round(max(STEP, (time[-1] - time[0]) / MOST_STEPS) / period))
+    per_bin = int(round(max(STEP, (time[-1] - time[0]) / MOST_STEPS) / record.period))
     bins = len(time) // max(per_bin, 1)
     if per_bin < 2 or bins < 2:
         return record
@@ -33,7 +32,9 @@ def coarsened(record: Record) -> Record:
     return record._replace(
         time=grid,
         dt=np.diff(grid, prepend=0.0),
+        step=float(np.median(np.diff(grid))),
         at=np.arange(1, bins + 1),
+        period=float(np.median(np.diff(centre))),
         measured=mean,
         noise=record.noise / np.sqrt(per_bin),
         signals={name: _coarsened(signal, used, per_bin, grid) for name, signal in record.signals.items()},

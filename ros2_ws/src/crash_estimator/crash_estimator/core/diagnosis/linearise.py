@@ -1,6 +1,7 @@
 """The equations of motion along a trajectory: what they miss (defect), and how motion and parameters change them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -71,7 +72,8 @@ def linearise(
     for j, link in enumerate(switched):
         present, (a, c) = forces[numbers[link.name]], link.ends
         crush, rate = _motion(link, record, r, trajectory)
-        other = link_force(link, np.append(theta, link.trial), record.time, blur * _steps(record), crush, rate)
+        tried = np.append(theta, link.trial)
+        other = link_force(_acting(link, theta), tried, record.time, blur * _steps(record), crush, rate)
         change = other.force - present.force
         into = external_for(layout.size + j)
         into[:, a] -= change * inverse[a]
@@ -112,6 +114,12 @@ def linearise(
     linear = Linear(record.dt, ends, crush_ends, inverse, layout.kind, kx, kv, kp, loading, knot, weight, pull, extra)
     every = np.concatenate([np.arange(layout.knots), np.array(list(external), dtype=int)])
     return Equations(linear, sampling, rows, every, forces)
+
+
+def _acting(link: Link, theta: np.ndarray) -> Link:
+    """Without effects that are at nothing: where only the force counts, their derivatives are work for nothing."""
+    forces, factors = (tuple(p for p in places if theta[p.coefficient]) for places in (link.forces, link.factors))
+    return replace(link, forces=forces, factors=factors)
 
 
 def _steps(record: Record) -> np.ndarray:
@@ -181,7 +189,7 @@ def output_noise(layout: Layout, record: Record, theta: np.ndarray, samples: int
     if record.mix is not None or not places:
         return Noise(record.noise, growth)
     mass, index = _masses(layout, theta), layout.structure.body_index
-    period = float(np.median(np.diff(record.time[record.at])))
+    period = record.period
     for place in places:
         addition = place.addition
         host, sigma = index[addition.host], record.signals[addition.target].noise
@@ -207,7 +215,7 @@ def _delay(layout: Layout, theta: np.ndarray, channel: str) -> tuple[float, int]
 
 def _sampling(layout: Layout, record: Record, theta: np.ndarray) -> tuple[Sampling, list[int]]:
     """How rows become outputs, and the parameters that act on outputs only."""
-    step = float(np.median(record.dt[1:]))
+    step = record.step
     found = [distortion(layout, theta, output.channel) for output in layout.outputs]
     lag = np.array([d.delay / step for d in found])
     parameters = [p for d in found for p in d.parameters if p >= 0]
@@ -225,7 +233,7 @@ def _sampling(layout: Layout, record: Record, theta: np.ndarray) -> tuple[Sampli
 def predicted(layout: Layout, record: Record, r: int, theta: np.ndarray, rows: np.ndarray):
     """(g, q) outputs that rows (g, b) give, and the columns of what acts on outputs only: (q, parameter, (g,))."""
     outputs, by = np.zeros((len(record.time), len(layout.outputs))), []
-    step = float(np.median(record.dt[1:]))
+    step = record.step
     for q, output in enumerate(layout.outputs):
         d = distortion(layout, theta, output.channel)
         lag = d.delay / step

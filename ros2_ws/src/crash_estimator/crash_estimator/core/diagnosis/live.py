@@ -25,7 +25,8 @@ from .coarse import coarsened
 from .fit import fit
 from .layout import Addition, Layout, make_layout
 from .live_answer import Change, LiveAnswer, curves
-from .live_candidates import MOST_ITERATIONS, LiveState, try_some
+from .live_candidates import ITERATIONS_ON, MOST_ITERATIONS, LiveState, try_some
+from .live_start import carried_on
 from .misfit import misfit_windows
 from .model import Model
 from .records import FEWEST_SAMPLES, Record, make_record
@@ -36,7 +37,7 @@ MOST_CELLS = 36
 CELLS_IN_ALL = 90
 """Of free curves over their crush scales: as fine as offline where elements are few."""
 
-BUDGET = 0.06
+BUDGET = 0.05
 """s of the processor's time; with the candidate that is being fitted then, an update stays below 0.1 s."""
 
 
@@ -65,7 +66,7 @@ class LiveDiagnosis:
         full = [make_record(self.structure, recording), *self.other_records]
         records = [coarsened(record) for record in full]
         scales = make_scales(self.structure, records, min(MOST_CELLS, CELLS_IN_ALL // len(self.structure.elements)))
-        given = _model(records, scales, additions_of(self.structure, scales, self.effects))
+        given = _model(state, records, scales, additions_of(self.structure, scales, self.effects))
         if given is None:
             return state, None
         state, tried = try_some(state, scales, self.effects, given, out_of_time)
@@ -96,9 +97,15 @@ def _clock(budget: float) -> Callable[[], bool]:
     return lambda: process_time() - begun > budget
 
 
-def _model(records: Sequence[Record], scales: Scales, additions: Sequence[Addition]) -> Model | None:
+def _model(
+    state: LiveState, records: Sequence[Record], scales: Scales, additions: Sequence[Addition]
+) -> Model | None:
+    """It goes on from its last fit; at first, and where it ended nowhere, from the measured motion."""
     layout = make_layout(scales.structure, records, scales, additions)
-    found = fit(layout, records, most=MOST_ITERATIONS)
+    start = carried_on(state.model, state.records, layout, records) if state.model else None
+    found = fit(layout, records, start, most=ITERATIONS_ON if start else MOST_ITERATIONS)
+    if start and not np.isfinite(found.cost):
+        found = fit(layout, records, most=MOST_ITERATIONS)
     return Model(tuple(additions), found, assess(found, records), {}, records) if np.isfinite(found.cost) else None
 
 

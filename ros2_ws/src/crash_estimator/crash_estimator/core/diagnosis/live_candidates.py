@@ -7,10 +7,12 @@ import numpy as np
 
 from ..effects.base import AttachedBody, Effect
 from .candidates import candidates, touching
-from .fit import REFINE, Fit, fit
+from .fit import FADE, REFINE, Fit, fit
 from .layout import Addition, Layout, make_layout
+from .live_start import carried_on
 from .model import Model
 from .motion import motion_of
+from .records import Record
 from .scales import Scales
 from .screening import Screened, changes_law, embedding, screen
 from .search import as_found
@@ -23,6 +25,8 @@ SHORTLIST = 8
 """... of so many that the screening names first."""
 
 MOST_ITERATIONS = 10
+ITERATIONS_ON = 5
+"""Of a fit that goes on from the last update's: what has not settled then does so at the next one."""
 
 Key = tuple[str, str]
 
@@ -35,6 +39,9 @@ class LiveState(NamedTuple):
     gains: Mapping[Key, float] = {}  # nats, when last fitted
     turns: Mapping[Key, int] = {}  # update at which it was last fitted
     screened: tuple[Screened, ...] = ()  # at every other update
+    records: Sequence[Record] = ()  # that it was made on
+    model: Fit | None = None  # without any candidate
+    fits: Mapping[Key, Fit] = {}  # of candidates, to these records
 
 
 def try_some(
@@ -49,18 +56,21 @@ def try_some(
     waiting = [one for one in shortlist(screened, SHORTLIST) if one.addition.key not in {a.key for a in leaders}]
     turn = sorted(waiting, key=lambda one: state.turns.get(one.addition.key, -1))[:1]
     chosen = [(addition, None) for addition in leaders]
-    chosen[1:1] = [(_variant(scales, one.addition, state.updates), one) for one in turn]
+    place = 2 if state.updates % 4 == 3 else 1  # at the end is who is left out when time runs out
+    chosen[place:place] = [(_variant(scales, one.addition, state.updates), one) for one in turn]
     found: list[Tried] = []
     for addition, one in chosen:
         if len(found) < fewest or not out_of_time():
-            found.append(_tried(scales, before, addition, one))
+            found.append(_tried(state, scales, before, addition, one))
     now = sorted((tried for tried in found if np.isfinite(tried.gain)), key=lambda tried: -tried.gain)
     gains = {**state.gains, **{tried.addition.key: tried.gain for tried in now}}
     turns = {**state.turns, **{tried.addition.key: state.updates for tried in found}}
     again = {tried.addition.key for tried in now}
     ahead = [as_found(tried) for tried in now] + [addition for addition in state.leaders if addition.key not in again]
     leaders = tuple(sorted(ahead, key=lambda addition: -gains[addition.key])[:LEADERS])
-    return LiveState(state.updates + 1, leaders, gains, turns, screened), now + _rest(screened, now, gains)
+    fits = {tried.addition.key: tried.fit for tried in now}
+    after = LiveState(state.updates + 1, leaders, gains, turns, screened, before.records, before.fit, fits)
+    return after, now + _rest(screened, now, gains)
 
 
 def _screened(state: LiveState, scales: Scales, effects: Mapping[str, Effect], before: Model) -> tuple[Screened, ...]:
@@ -78,8 +88,8 @@ def _variant(scales: Scales, addition: Addition, turn: int) -> Addition:
     return variants[turn % len(variants)]
 
 
-def _tried(scales: Scales, before: Model, addition: Addition, screened: Screened | None) -> Tried:
-    fitted = _fit(before, scales, addition, screened)
+def _tried(state: LiveState, scales: Scales, before: Model, addition: Addition, screened: Screened | None) -> Tried:
+    fitted = _fit(state, before, scales, addition, screened)
     return Tried(addition, fitted.evidence - before.fit.evidence, fitted, None)
 
 
@@ -95,11 +105,19 @@ def _rest(screened: Sequence[Screened], now: Sequence[Tried], gains: Mapping[Key
     return sorted((tried for tried in rest.values() if tried), key=lambda tried: -tried.gain)
 
 
-def _fit(before: Model, scales: Scales, addition: Addition, screened: Screened | None) -> Fit:
-    """From the measured motion; from the model's own where that leaves little."""
+def _fit(state: LiveState, before: Model, scales: Scales, addition: Addition, screened: Screened | None) -> Fit:
+    """The first of the leaders goes on from its last fit; others, which may have been led astray, start from the
+    measured motion, or from the model's own where that leaves little."""
     layout = make_layout(scales.structure, before.records, scales, (*before.additions, addition))
+    last = state.fits.get(addition.key)
+    if last and addition is state.leaders[0]:
+        start = carried_on(last, state.records, layout, before.records)
+        again = fit(layout, before.records, start, most=ITERATIONS_ON)
+        if np.isfinite(again.cost):
+            return again
     start = _start(before, layout, addition, screened) if before.left.whiteness.white else None
-    return fit(layout, before.records, start, before.fit.cost + HOPELESS, MOST_ITERATIONS, REFINE)
+    stages = REFINE if start else FADE
+    return fit(layout, before.records, start, before.fit.cost + HOPELESS, MOST_ITERATIONS, stages)
 
 
 def _start(before: Model, layout: Layout, addition: Addition, screened: Screened | None):

@@ -53,7 +53,7 @@ def driven_motion(layout: Layout, record: Record, r: int, theta: np.ndarray):
             if offset >= 0:
                 by.append((k, offset, np.full(g, -share / (1.0 + d.gain))))
             if delay >= 0:
-                step = 0.5 * float(np.median(record.dt[1:]))
+                step = 0.5 * record.step
                 up, down = (np.interp(after + s * step, signal.time, signal.values) for s in (1.0, -1.0))
                 by.append((k, delay, share * (up - down) / (2.0 * step) / (1.0 + d.gain)))
         first = layout.modes[r][k]

@@ -48,7 +48,9 @@ class Record(NamedTuple):
     test: Test
     time: np.ndarray  # (g,) s since the impact, from 0
     dt: np.ndarray  # (g,) s from the instant before; 0 at the first
+    step: float  # s, median of dt
     at: np.ndarray  # (n,) indices of the samples on the grid
+    period: float  # s, median between samples
     measured: np.ndarray  # (n, q) zero offset removed, NaN where not valid
     noise: np.ndarray  # (q,) standard deviation of one sample
     noise_samples: np.ndarray  # (q,) samples that it was found from; inf where the model states it
@@ -97,7 +99,9 @@ def make_record(structure: Structure, recording: Recording) -> Record:
         test=recording.test,
         time=time,
         dt=np.diff(time, prepend=time[0]),
+        step=float(np.median(np.diff(time))),
         at=at,
+        period=float(np.median(np.diff(time[at]))),
         measured=measured,
         noise=noise,
         noise_samples=np.array([np.inf if g else signals[o.channel].noise_samples for g, o in zip(given, outputs)]),
@@ -115,9 +119,10 @@ def _grid(sample_time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Instants from time zero on, with every sample among them -> (g,) s, (n,) index of each sample."""
     stops = sample_time if sample_time[0] < 1e-9 else np.concatenate([[0.0], sample_time])
     steps = np.maximum(np.ceil(np.diff(stops) / LONGEST_STEP - 1e-6).astype(int), 1)
-    pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(stops, stops[1:], steps)]
     index = np.concatenate([[0], np.cumsum(steps)])
-    return np.concatenate([*pieces, stops[-1:]]), index[len(stops) - len(sample_time) :]
+    within = np.arange(index[-1]) - np.repeat(index[:-1], steps)
+    time = within * np.repeat(np.diff(stops) / steps, steps) + np.repeat(stops[:-1], steps)
+    return np.append(time, stops[-1]), index[len(stops) - len(sample_time) :]
 
 
 def _signal(recording: Recording, name: str) -> Signal:

@@ -59,6 +59,6 @@ def measured_crush(record: Record, displacement: str, velocity: str | None) -> t
         signal = record.signals[velocity]
         return crush, np.interp(record.time, signal.time, signal.values)
     slope = np.gradient(crush, record.time)
-    width = max(int(round(RATE_SMOOTHING / np.median(record.dt[1:]))), 1) | 1
+    width = max(int(round(RATE_SMOOTHING / record.step)), 1) | 1
     padded = np.concatenate([np.full(width // 2, slope[0]), slope, np.full(width // 2, slope[-1])])
     return crush, np.convolve(padded, np.full(width, 1.0 / width), "valid")
