@@ -10,10 +10,10 @@ from .layout import Layout
 from .linearise import linearise, output_noise, predicted
 from .linkforce import LinkForce
 from .motion import motion_of
-from .normal import may_diverge
+from .normal import may_diverge, whitened
 from .records import Record
 from .trajectory import Trajectory
-from .whiteness import Whiteness, whiteness
+from .whiteness import Absorbed, Whiteness, whiteness, whiteness_of_fit
 
 SIMULATION_STEPS = 8
 SIMULATED = 1e-6
@@ -50,8 +50,31 @@ def noise_floor(layout: Layout, records: Sequence[Record]) -> float:
     return rms(layout, [np.where(np.isfinite(r.measured), r.noise, np.nan) for r in records])
 
 
-def assess(fitted: Fit, records: Sequence[Record]) -> Left:
-    return _left(fitted.layout, records, fitted.theta, fitted.trajectories)
+def assess(fitted: Fit, records: Sequence[Record], sharply: bool = False) -> Left:
+    """What a fit leaves; sharply: white is only what looks so also beside what the fit must have absorbed.
+
+    That shows where a curve has not yet been let fold (`curves.adapted_roughness`), too: it is for finished models.
+    """
+    left = _left(fitted.layout, records, fitted.theta, fitted.trajectories)
+    if not sharply or not left.whiteness.white or records[0].mix is not None:
+        return left
+    absorbed = [_absorbed(fitted, record, r) for r, record in enumerate(records)]
+    sharper = whiteness_of_fit(absorbed, [record.noise_samples for record in records])
+    return left if sharper.white else left._replace(whiteness=sharper)
+
+
+@may_diverge
+def _absorbed(fitted: Fit, record: Record, r: int) -> list[Absorbed]:
+    """One for each output."""
+    equations = linearise(fitted.layout, record, r, fitted.theta, fitted.trajectories[r])
+    residual, jacobian = whitened(fitted.layout, record, r, fitted.theta, fitted.trajectories[r], equations)
+    columns = equations.columns
+    covariance = fitted.covariance[np.ix_(columns, columns)]
+    std = np.sqrt(np.diagonal(covariance))  # of units that differ by many orders of magnitude
+    values, vectors = np.linalg.eigh(covariance / np.outer(std, std))
+    roots = (jacobian * std) @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    period = float(record.time[-1]) / record.bins
+    return [Absorbed(residual[:, q], roots[:, q], period) for q in range(residual.shape[1])]
 
 
 @may_diverge
@@ -64,10 +87,10 @@ def _left(layout: Layout, records: Sequence[Record], theta: np.ndarray, trajecto
         residuals.append(np.where(record.valid[record.at] > 0.0, record.measured - output, np.nan))
         links.append(equations.links)
     noise = tuple(output_noise(layout, record, theta).std for record in records)
-    whitened = [residual / std for residual, std in zip(residuals, noise)]
-    periods = [float(np.median(np.diff(record.time[record.at]))) for record in records]
-    white = whiteness(whitened, [record.noise_samples for record in records], periods)
-    cost = float(np.nanmean(np.concatenate([w.ravel() for w in whitened]) ** 2))
+    scaled = [residual / std for residual, std in zip(residuals, noise)]
+    periods = [record.period for record in records]
+    white = whiteness(scaled, [record.noise_samples for record in records], periods)
+    cost = float(np.nanmean(np.concatenate([z.ravel() for z in scaled]) ** 2))
     return Left(tuple(outputs), tuple(residuals), noise, tuple(links), white, rms(layout, residuals), cost)
 
 

@@ -27,6 +27,9 @@ FADE = (Stage(200.0, 30.0, 16.0), Stage(80.0, 10.0, 8.0), Stage(30.0, 3.0, 4.0),
 
 A force that jumps at separation is felt by the fit only while it jumps: blurred, it is drawn to the right instant."""
 
+HOTTER = tuple(stage._replace(inflate=10.0 * stage.inflate) for stage in FADE)
+"""Where that has led nowhere: less is believed at first, so that less is fitted to a motion that is still wrong."""
+
 REFINE = (Stage(0.0, 2.0, 6.0), Stage(0.0, 1.0, 2.0))
 """Stages of a fit that starts from a simulation."""
 
@@ -135,12 +138,26 @@ def advance(
 
 def equation_error_start(layout: Layout, records: Sequence[Record]) -> tuple[np.ndarray, list[Trajectory]]:
     """Parameters that fit the forces along the measured motion, and that motion."""
+    theta, trajectories, step = _along_the_measured(layout, records, FADE[0].inflate)
+    return theta + step.delta, trajectories
+
+
+def equation_error(layout: Layout, records: Sequence[Record], inflate: float = 30.0) -> float:
+    """What that fit leaves, in noise taken larger, for the motion's own errors weigh more; effects stay as they start."""
+    try:
+        return _along_the_measured(layout, records, inflate, [p.coefficient for p in layout.places])[2].after
+    except LinAlgError:
+        return np.inf
+
+
+def _along_the_measured(layout: Layout, records: Sequence[Record], inflate: float, kept: Sequence[int] = ()):
     theta = layout.start.copy()
     trajectories = [measured_motion(layout, record, r, theta) for r, record in enumerate(records)]
     normal, _ = normal_equations(layout, records, theta, trajectories, follow=False)
     held = shape_parameters(layout)
     held[layout.common :] = True
-    return theta + solve(layout, normal, theta, FADE[0].inflate, held).delta, trajectories
+    held[list(kept)] = True
+    return theta, trajectories, solve(layout, normal, theta, inflate, held)
 
 
 def shape_parameters(layout: Layout) -> np.ndarray:
@@ -162,10 +179,10 @@ def fit(
 ) -> Fit:  # fmt: skip
     """Fit from the measured motion, or from given parameters and trajectories.
 
-    hopeless: cost above which, after LEAST iterations, it is not worth going on; refine: stages before the free run
-    of a fit that is given its start.
+    hopeless: cost above which, after LEAST iterations, it is not worth going on; refine: stages before the free run,
+    FADE where none are given and the fit starts from the measured motion.
     """
-    stages = list(refine) if start else list(FADE)
+    stages = list(refine or (() if start else FADE))
     point = _Point(*(start or equation_error_start(layout, records)))
     shapes = shape_parameters(layout)
     kept: tuple[_Point, Step] | None = None

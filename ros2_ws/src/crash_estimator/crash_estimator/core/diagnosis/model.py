@@ -8,7 +8,7 @@ import numpy as np
 from ..structure import Structure
 from .assess import Left, assess
 from .curves import adapted_roughness
-from .fit import MOST_ITERATIONS, SLOWLY, Fit, fit
+from .fit import HOTTER, MOST_ITERATIONS, SLOWLY, Fit, fit
 from .layout import Addition, Layout, make_layout
 from .records import Record
 from .scales import Scales
@@ -31,18 +31,25 @@ def fit_model(
     """Fit, then let the curves fold where they were found to bend sharply, and fit again."""
     layout = make_layout(structure, records, scales, additions)
     found = fit(layout, records, (start.theta, start.trajectories) if start else None)
+    if not found.cost < cost_of_nothing(records):
+        found = fit(layout, records, refine=HOTTER)
     roughness = {
         link.name: adapted_roughness(link.curve, found.theta) for link in layout.links if link.curve is not None
     }
     if roughness and np.isfinite(found.cost):
         layout = make_layout(structure, records, scales, additions, roughness)
         found = fit(layout, records, (found.theta, found.trajectories))
-    left = assess(found, records)
+    left = assess(found, records, sharply=True)
     if forces_jump(layout) and not left.whiteness.white and records[0].mix is None:
         slower = fit(layout, records, (found.theta, found.trajectories), refine=SLOWLY, most=2 * MOST_ITERATIONS)
         if slower.evidence > found.evidence:
-            found, left = slower, assess(slower, records)
+            found, left = slower, assess(slower, records, sharply=True)
     return Model(tuple(additions), found, left, roughness, records)
+
+
+def cost_of_nothing(records: Sequence[Record]) -> float:
+    """Of predicting zero: a fit that leaves more has gone astray."""
+    return sum(float(np.nansum((record.measured / record.noise) ** 2)) for record in records)
 
 
 def forces_jump(layout: Layout) -> bool:

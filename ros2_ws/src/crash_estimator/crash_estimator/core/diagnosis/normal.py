@@ -56,7 +56,7 @@ def normal_equations(
         if not follow:
             still = np.zeros_like(equations.linear.kx)
             equations = equations._replace(linear=equations.linear._replace(kx=still, kv=still, kp=still))
-        residual, jacobian = _outputs(layout, record, r, theta, trajectory, equations, target)
+        residual, jacobian = whitened(layout, record, r, theta, trajectory, equations, target)
         flat = jacobian.reshape(-1, jacobian.shape[-1])
         c = equations.columns
         matrix[np.ix_(c, c)] += flat.T @ flat
@@ -77,7 +77,7 @@ def _filled(record: Record) -> np.ndarray:
     return np.array([np.count_nonzero(_binned(record, valid)) for valid in record.valid.T])
 
 
-def _outputs(layout, record, r, theta, trajectory, equations, target) -> tuple[np.ndarray, np.ndarray]:
+def whitened(layout, record, r, theta, trajectory, equations, target=None) -> tuple[np.ndarray, np.ndarray]:
     """Whitened binned residual (bins, q) corrected for the defect, and its derivative (bins, q, columns)."""
     out = np.zeros((record.bins, len(layout.outputs), 1 + len(equations.columns)))
     propagate(equations.linear, layout.knots, equations.sampling, out, NO_TRACE)

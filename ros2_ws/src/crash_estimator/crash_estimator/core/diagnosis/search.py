@@ -94,7 +94,7 @@ def without_the_superseded(
 def _refitted(scales: Scales, records: Sequence[Record], additions: Sequence[Addition], like: Model) -> Model:
     """Fitted with the other model's hyperparameters, so that evidences compare."""
     found = fit(make_layout(scales.structure, records, scales, additions, like.roughness), records)
-    return Model(tuple(additions), found, assess(found, records), like.roughness, records)
+    return Model(tuple(additions), found, assess(found, records, sharply=True), like.roughness, records)
 
 
 def _round_again(round_: Round, before: Model, gain: float | None) -> Round:
@@ -122,7 +122,7 @@ def _without(scales: Scales, model: Model, tried: Tried) -> Model:
     along = enumerate(zip(model.records, tried.fit.trajectories))
     motions = [motion_of(layout, record, r, theta, trajectory.a) for r, (record, trajectory) in along]
     found = fit(layout, model.records, (theta, motions))
-    return model._replace(fit=found, left=assess(found, model.records))
+    return model._replace(fit=found, left=assess(found, model.records, sharply=True))
 
 
 def one_round(records: Sequence[Record], scales: Scales, effects: Mapping[str, Effect], model: Model) -> Round:
@@ -133,7 +133,13 @@ def one_round(records: Sequence[Record], scales: Scales, effects: Mapping[str, E
         return done
     for _ in range(TEMPERINGS):
         left = assess(done.best.fit, done.before.records) if done.best else done.before.left
-        noisier = tempered(records, left.residual)
+        noisier = tempered(records, bounded(left.residual, records))
         before = fit_model(scales.structure, noisier, scales, model.additions)
         done = Round(before, try_candidates(noisier, scales, effects, before))
     return done
+
+
+def bounded(residuals: Sequence[np.ndarray], records: Sequence[Record]) -> list[np.ndarray]:
+    """Residuals, and what was measured itself where a motion without bounds has left more."""
+    pairs = zip(residuals, (record.measured for record in records))
+    return [r if np.nanstd(r) < np.nanstd(measured) else measured for r, measured in pairs]

@@ -9,7 +9,7 @@ import numpy as np
 from ..effects.base import AttachedBody, ChannelError, Effect
 from .assess import assess
 from .candidates import candidates, touching
-from .fit import MOST_ITERATIONS, REFINE, SLOWLY, Fit, fit
+from .fit import FADE, HOTTER, MOST_ITERATIONS, REFINE, SLOWLY, Fit, Stage, equation_error, fit
 from .layout import Addition, Layout, make_layout
 from .model import Model
 from .motion import motion_of
@@ -42,8 +42,8 @@ WORTH_FITTING = 1.0
 HOPELESS = 400.0
 """A candidate whose cost stays this far above the best one's is not fitted to the end."""
 
-OFFSET_START = 25.0
-"""m/s^2: an offset bends the measured motion itself, from which fits start."""
+OFFSETS, OFFSET_STARTS = 10, 2
+"""An offset bends the measured motion itself, from which fits start: so many are looked at, so many are fitted from."""
 
 
 class Tried(NamedTuple):
@@ -73,13 +73,14 @@ def try_candidates(
     search.from_model(shortlist(worth, SHORTLIST))
     if thorough and not model.left.whiteness.white:
         offsets = [a for a in additions if isinstance(a.effect, ChannelError) and a.effect.role == "offset"]
-        shifted = [replace(a, coefficient=sign * OFFSET_START) for a in offsets for sign in (-1.0, 1.0)]
+        shifted = [start for a in offsets for start in offset_starts(records, scales, model, a)]
         for harder in (
             search.slowly,
             lambda: search.from_model(shortlist(by_motion, SHORTLIST) + shortlist(worth, LONG_LIST)),
             lambda: search.from_motion(shortlist(worth, SHORTLIST) + shortlist(by_motion, LONG_LIST)),
             lambda: search.from_motion([Screened(a, 0.0, a.coefficient, 1.0) for a in shifted]),
             search.slowly,
+            lambda: search.from_motion(shortlist(by_motion, SHORTLIST) + shortlist(worth, SHORTLIST), HOTTER),
         ):
             if search.reached_the_floor():
                 break
@@ -94,15 +95,15 @@ class _Search:
         self.records, self.scales, self.model = records, scales, model
         self.screened = screened
         self.least = model.fit.cost
-        self.done: set[tuple[int, bool]] = set()
+        self.done: set[tuple[int, Sequence[Stage]]] = set()
         self.found: dict[tuple[str, str], Tried] = {}
         for one in screened:
             self.found.setdefault(one.addition.key, Tried(one.addition, one.gain, None, one))
 
-    def from_motion(self, chosen: Iterable[Screened]) -> None:
+    def from_motion(self, chosen: Iterable[Screened], stages: Sequence[Stage] = FADE) -> None:
         """Fit candidates from the measured motion."""
         for one in chosen:
-            self._fit(one.addition, None)
+            self._fit(one.addition, None, stages)
             if isinstance(one.addition.effect, AttachedBody):
                 self._touching(one.addition)
 
@@ -132,14 +133,15 @@ class _Search:
                 tried.addition, fit(tried.fit.layout, self.records, start, refine=SLOWLY, most=2 * MOST_ITERATIONS)
             )
 
-    def _fit(self, addition: Addition, screened: Screened | None) -> None:
-        if (id(addition), screened is None) in self.done:
+    def _fit(self, addition: Addition, screened: Screened | None, stages: Sequence[Stage] = FADE) -> None:
+        stages = REFINE if screened else stages
+        if (id(addition), stages) in self.done:
             return
-        self.done.add((id(addition), screened is None))
+        self.done.add((id(addition), stages))
         model, scales = self.model, self.scales
         layout = make_layout(scales.structure, self.records, scales, [*model.additions, addition], model.roughness)
         start = self._start(layout, addition, screened) if screened else None
-        self._note(addition, fit(layout, self.records, start, self.least + HOPELESS, refine=REFINE))
+        self._note(addition, fit(layout, self.records, start, self.least + HOPELESS, refine=stages))
 
     def _note(self, addition: Addition, found: Fit) -> None:
         self.least = min(self.least, found.cost)
@@ -167,7 +169,9 @@ class _Search:
     def reached_the_floor(self) -> bool:
         """The best so far leaves nothing but noise."""
         best = next(iter(self.ranking()), None)
-        return best is not None and best.fit is not None and best.gain > GAIN and assess(best.fit, self.records).whiteness.white
+        if best is None or best.fit is None or best.gain <= GAIN:
+            return False
+        return assess(best.fit, self.records, sharply=True).whiteness.white
 
     def ranking(self) -> list[Tried]:
         """Fitted ones first: a screened gain is an estimate, and does not rank above a fit."""
@@ -175,6 +179,19 @@ class _Search:
         rest = sorted((t for t in self.found.values() if not t.fit), key=lambda t: -t.gain)
         least = max(fitted[-1].gain, 0.0) if fitted else np.inf
         return fitted + [t._replace(gain=min(t.gain, least)) for t in rest]
+
+
+def offset_starts(records: Sequence[Record], scales: Scales, model: Model, addition: Addition) -> list[Addition]:
+    """The offset at the values with which the forces along the measured motion fit best."""
+    low, high = addition.effect.low, addition.effect.high
+    step = (high - low) / OFFSETS
+    shifted = [replace(addition, coefficient=low + step * (k + 0.5)) for k in range(OFFSETS)]
+
+    def misfit(one: Addition) -> float:
+        layout = make_layout(scales.structure, records, scales, [*model.additions, one], model.roughness)
+        return equation_error(layout, records)
+
+    return sorted(shifted, key=misfit)[:OFFSET_STARTS]
 
 
 def _handicap(addition: Addition) -> float:

@@ -1,0 +1,70 @@
+"""What the search for the missing effect relies on: a test of what fits leave, and starts that lead somewhere."""
+
+import numpy as np
+from scipy.fft import dct, idct
+
+from crash_estimator.core.diagnosis.candidates import candidates
+from crash_estimator.core.diagnosis.model import fit_model
+from crash_estimator.core.diagnosis.records import make_record
+from crash_estimator.core.diagnosis.scales import make_scales
+from crash_estimator.core.diagnosis.search import bounded
+from crash_estimator.core.diagnosis.trying import OFFSET_STARTS, OFFSETS, offset_starts
+from crash_estimator.core.diagnosis.whiteness import Absorbed, whiteness, whiteness_of_fit
+from crash_estimator.core.effects import EFFECTS
+from crash_estimator.model_file import ModelFile
+from crash_replay.synthetic.hidden.cases import draw_case
+
+SAMPLES, PERIOD = 1000, 1e-4
+SLOW = idct(np.eye(SAMPLES)[:8], norm="ortho", axis=1).T
+"""Eight parameters, each with a slow cosine as its derivative."""
+
+
+def left_by_a_fit(seen: np.ndarray) -> tuple[np.ndarray, Absorbed]:
+    """Residual of a least-squares fit of the slow cosines, and what is known of it."""
+    residual = seen - SLOW @ (SLOW.T @ seen)
+    return residual[:, None], Absorbed(residual, SLOW, PERIOD)
+
+
+def test_noise_that_a_fit_has_absorbed_is_not_taken_for_an_effect():
+    """One wrong alarm in a thousand is meant: four in 400 come once in a thousand runs."""
+    rng = np.random.default_rng(3)
+    known = [np.full(1, np.inf)]
+    found = [whiteness_of_fit([[left_by_a_fit(rng.normal(size=SAMPLES))[1]]], known) for _ in range(400)]
+    assert sum(not one.white for one in found) < 4
+    assert abs(np.mean([one.probability for one in found]) - 0.5) < 4.0 / np.sqrt(12.0 * len(found))
+
+
+def test_a_wave_that_a_fit_has_mostly_absorbed_is_seen_in_what_it_leaves():
+    """Below 60 Hz there are 12 cosines, of which the fit takes 8: what it leaves in 4 hides among 12, not among 4."""
+    noise = dct(np.random.default_rng(4).normal(size=SAMPLES), norm="ortho")
+    noise[:8] += 20.0
+    noise[8:12] = np.array([1.0, -1.0, 1.0, -1.0]) * np.sqrt(7.0)
+    residual, absorbed = left_by_a_fit(idct(noise, norm="ortho"))
+    known = [np.full(1, np.inf)]
+    assert whiteness([residual], known, [PERIOD]).white
+    found = whiteness_of_fit([[absorbed]], known)
+    assert not found.white and found.worst.low == 0.0
+
+
+def test_an_offset_is_searched_from_where_the_forces_fit_best():
+    """It bends the measured motion: from the wrong side of zero no fit finds back (a side impact, one recording)."""
+    drawn = draw_case("side", ("channel_offset",), 80026)
+    structure = ModelFile.model_validate(dict(drawn.specimen.model)).structure()
+    records = [make_record(structure, drawn.record(1.1, 2.0)[0])]
+    scales = make_scales(structure, records, 36)
+    (hidden,) = drawn.hidden
+    addition = next(a for a in candidates(structure, scales, EFFECTS) if a.key == ("channel_offset", hidden.target))
+    starts = [one.coefficient for one in offset_starts(records, scales, fit_model(structure, records, scales, ()), addition)]
+    assert len(starts) == OFFSET_STARTS
+    step = (addition.effect.high - addition.effect.low) / OFFSETS
+    assert abs(starts[0] - hidden.coefficient) < step
+
+
+def test_a_motion_without_bounds_leaves_no_more_than_was_measured():
+    """Its residual would be taken for noise 20 powers of ten larger than any signal."""
+    drawn = draw_case("impactor", ("viscous_damping",), 3100)
+    structure = ModelFile.model_validate(dict(drawn.specimen.model)).structure()
+    record = make_record(structure, drawn.record(1.1, 1.0)[0])
+    small, wild = 0.1 * record.measured, 1e25 * record.measured
+    assert bounded([small], [record])[0] is small
+    assert bounded([wild], [record])[0] is record.measured
