@@ -28,7 +28,7 @@ from crash_replay.recording import Recording
 from crash_replay.ros_messages import samples_to_msg, test_to_msg
 
 TIME_ZERO = 1_000_000_000
-MODEL = """
+UNDAMPED = """
 name: oscillator
 bodies:
   block: {mass: 10, acceleration: block_ax}
@@ -37,10 +37,10 @@ elements:
   spring:
     between: [block, wall]
     stiffness: {estimate: true, initial: 1.0e4, min: 0.0}
-    damping: {estimate: true, initial: 0.0, std: 100.0}
     displacement: travel
     velocity: speed
 """
+MODEL = f"{UNDAMPED}    damping: {{estimate: true, initial: 0.0, std: 100.0}}\n"
 TOPICS = {"parameters": Parameters, "residuals": Residuals, "forces": Forces, "events": Event}
 
 

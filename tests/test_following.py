@@ -1,5 +1,6 @@
 """Following a test forward, back and in jumps: whichever way leads to a sample, the state is the same."""
 
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -9,9 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
+from crash_estimator.core.effects.change import add_effect
 from crash_estimator.core.fold import run
 from crash_estimator.core.methods import METHODS, make_estimator
 from crash_estimator.core.structure import Coefficient
+from crash_estimator.following.again import estimated_again
 from crash_estimator.following.alignment import PATIENCE, Alignment
 from crash_estimator.following.arrivals import Arrivals
 from crash_estimator.following.checkpoints import LIMIT, STRIDE, Checkpoints
@@ -243,3 +246,15 @@ def test_numbers_count_from_the_earliest_sample_seen(recording):
     fed.assert_is(recording, 0, range(30, 40), first=30)
     fed.assert_is(recording, 1, range(40))
     assert fed.renumbered == [False, True]
+
+
+def test_a_coefficient_that_was_given_is_told_without_a_sigma_one_that_is_estimated_with_it(recording):
+    follower = follower_of(recording)
+    take(follower, recording, 0, len(recording))
+
+    def told(coefficient: float | None) -> str:
+        structure = add_effect(oscillator(ESTIMATED, **DAMPED), "coulomb_friction", "spring", coefficient=coefficient)
+        return estimated_again(follower, make_estimator(structure, recording.test, "mrls"))[1]
+
+    assert told(20.0) == "400 samples estimated again; spring.coulomb_friction 20 N, as given"
+    assert re.fullmatch(r"400 samples estimated again; spring.coulomb_friction \S+ \+- [1-9.]\S* N", told(None))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from crash_msgs.srv import AddEffect, RemoveEffect
 from helpers_estimation import oscillator_recording
-from helpers_estimator_node import joined
+from helpers_estimator_node import UNDAMPED, joined
 from numpy.testing import assert_array_equal
 from rclpy.parameter import Parameter
 
@@ -18,18 +18,6 @@ from crash_estimator.model_file import load_model
 from crash_estimator.nodes.estimator_node import EstimatorNode
 from crash_replay.recording import Recording
 
-MODEL = """
-name: oscillator
-bodies:
-  block: {mass: 10, acceleration: block_ax}
-  wall: {fixed: true}
-elements:
-  spring:
-    between: [block, wall]
-    stiffness: {estimate: true, initial: 1.0e4, min: 0.0}
-    displacement: travel
-    velocity: speed
-"""
 OWN = '''
 """A force with the third power of the rate."""
 from crash_estimator.core.effects.base import ElementForce
@@ -41,7 +29,7 @@ EFFECT = ElementForce("cubic_damping", "N*s^3/m^3", force=lambda motion: motion.
 @pytest.fixture
 def model(tmp_path) -> str:
     path = tmp_path / "oscillator.yaml"
-    path.write_text(MODEL)
+    path.write_text(UNDAMPED)
     return str(path)
 
 

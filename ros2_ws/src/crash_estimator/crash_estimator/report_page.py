@@ -20,6 +20,7 @@ from .core.free_run import compare, free_run
 from .core.methods import make_estimator
 from .core.structure import ModelError, Structure
 from .core.validation import LEVELS, Validation, validate
+from .diagnosis_doubt import doubt
 from .diagnosis_tables import diagnosis_tables
 from .figures import Line, Panel, draw, markdown_table, write_markdown
 from .tables import READABLE, error_table, parameter_table
@@ -95,8 +96,8 @@ def _missing(recording: Recording, structure: Structure, end: float, effects: Ma
         found = diagnose(structure, [judged], effects)
     except (ModelError, RecordingError) as error:
         return ["## What is missing", "", f"Not searched: {error}.", ""]
-    text = found.text[0].upper() + found.text[1:]
-    said = f"{text}. Errors here are of the best fit with one curve for each element over the whole record."
+    said = "".join(f"{text[0].upper()}{text[1:]}. " for text in (found.text, doubt(found)) if text)
+    said += "Errors here are of the best fit with one curve for each element over the whole record."
     return ["## What is missing", "", said, "", _code(diagnosis_tables(found)), ""]
 
 

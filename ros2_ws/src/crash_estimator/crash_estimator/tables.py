@@ -73,7 +73,8 @@ def besides_table(description: Description, last: Estimate) -> str:
 
 
 def error_table(errors: Sequence[EquationError]) -> str:
-    """Mean and standard deviation of measurement and error per equation (tables 5.1 and 5.2 give variances)."""
+    """Mean and standard deviation of measurement and error per equation (tables 5.1 and 5.2 give variances), and RMS of
+    the error."""
     rows = []
     for row in errors:
         shown, factor = READABLE[row.unit]
@@ -86,8 +87,9 @@ def error_table(errors: Sequence[EquationError]) -> str:
                 f"{np.sqrt(row.input_variance) * factor:.2f}",
                 f"{row.error_mean * factor:.3f}",
                 f"{np.sqrt(row.error_variance) * factor:.3f}",
+                f"{row.rms * factor:.3f}",
                 f"{1.0 - share:.1%}",
             )
         )
-    head = ("equation", "unit", "measured mean", "sd", "error mean", "sd", "explained")
+    head = ("equation", "unit", "measured mean", "sd", "error mean", "sd", "RMS", "explained")
     return table(head, rows)

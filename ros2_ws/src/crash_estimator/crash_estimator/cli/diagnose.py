@@ -16,6 +16,7 @@ from ..core.effects.base import Effect, UnloadingSlope
 from ..core.effects.targets import key_of
 from ..core.effects.user import load_effects
 from ..core.structure import EffectSpec, ModelError
+from ..diagnosis_doubt import doubt
 from ..diagnosis_tables import diagnosis_tables
 from ..model_file import load_model, model_path, ready_models
 from .common import guarded, write_json
@@ -39,7 +40,8 @@ def run(arguments: argparse.Namespace) -> None:
         if path:
             _writable(option, Path(path))
     found = diagnose(structure, [read_bag(bag) for bag in arguments.bags], effects)
-    print(f"{found.text}\n\n{diagnosis_tables(found)}")
+    print("\n".join(line for line in (found.text, doubt(found)) if line))
+    print(f"\n{diagnosis_tables(found)}")
     if arguments.json:
         write_json(arguments.json, found.as_json())
     if arguments.apply:

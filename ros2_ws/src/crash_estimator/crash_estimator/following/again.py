@@ -1,5 +1,6 @@
 """The same samples once more, with another model."""
 
+from ..core.estimate import ParameterStatus
 from ..core.methods import AnyEstimator
 from .follower import Follower
 
@@ -15,6 +16,8 @@ def estimated_again(old: Follower, estimator: AnyEstimator) -> tuple[Follower, s
     description, there = estimator.description, old.estimator.description.parameters
     for k, name in enumerate(description.parameters):
         if columns and name not in there:
-            value, std = (columns.of[field][-1, k] for field in ("value", "std"))
-            text += f"; {name} {value:.4g} +- {std:.2g} {description.parameter_units[k]}"
+            value, std, status = (columns.of[field][-1, k] for field in ("value", "std", "status"))
+            # one that the model gives is not estimated here: whoever found it knows its sigma
+            sigma, given = ("", ", as given") if status == ParameterStatus.KNOWN else (f" +- {std:.2g}", "")
+            text += f"; {f'{name} {value:.4g}{sigma} {description.parameter_units[k]}'.rstrip()}{given}"
     return follower, text

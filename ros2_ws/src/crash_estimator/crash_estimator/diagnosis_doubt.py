@@ -1,0 +1,63 @@
+"""When what was found should not be believed before the model itself has been checked: one sentence.
+
+A structure that is wrong in its bodies, masses or attachments still gets an answer, as the effects of the vocabulary
+are bent to do its work. What gives it away: as given it leaves most of what a channel measures, and no effect mends
+that; or effects are stacked; or one of them is as large as it may be.
+"""
+
+import numpy as np
+
+from .core.diagnosis.diagnosis import Diagnosis
+from .core.diagnosis.model import Model
+
+LITTLE = 0.5
+"""Share of a channel's mean square: with less, what is missing is larger than what is there."""
+
+HEARD = 3.0
+"""Standard deviations of the noise: what a channel measures must be above it to count."""
+
+STACK = 3
+"""Effects: two may well be missing at once."""
+
+AT_LIMIT = 0.999
+
+
+def doubt(found: Diagnosis) -> str:
+    """One sentence where the model itself may be wrong, else nothing."""
+    if found.verdict == "adequate":
+        return ""
+    reasons = []
+    channel, share = worst_explained(found.models[0])
+    if share < LITTLE and found.verdict == "unexplained":
+        reasons.append(f"as given it explains {max(share, 0.0):.0%} of {channel}")
+    if len(found.steps) >= STACK:
+        reasons.append(f"it takes {len(found.steps)} effects to mend it")
+    reasons += [f"{name} is as large as it may be" for name in at_limit(found)]
+    return f"the model itself may be wrong ({', '.join(reasons)}): check bodies, masses and attachments" * bool(reasons)
+
+
+def worst_explained(model: Model) -> tuple[str, float]:
+    """The channel of which a fit leaves most, and the share of its mean square, above the noise, that it explains."""
+    worst = "", 1.0
+    for q, output in enumerate(model.fit.layout.outputs):
+        measured = np.concatenate([record.measured[:, q] for record in model.records])
+        left = np.concatenate([residual[:, q] for residual in model.left.residual])
+        noise = float(np.mean([record.noise[q] ** 2 for record in model.records]))
+        power = float(np.nanmean(measured**2))
+        if power > HEARD**2 * noise:
+            share = 1.0 - max(float(np.nanmean(left**2)) - noise, 0.0) / (power - noise)
+            worst = min(worst, (output.channel, share), key=lambda one: one[1])
+    return worst
+
+
+def at_limit(found: Diagnosis) -> list[str]:
+    """Effects added whose coefficient has come to the largest size that is admitted."""
+    layout, theta = found.models[-1].fit.layout, found.models[-1].fit.theta
+    added = {(step.effect, step.target) for step in found.steps}
+    names = []
+    for place in layout.places:
+        value, low, high = (of[place.coefficient] for of in (theta, layout.prior.low, layout.prior.high))
+        limit = high if value > 0.0 else low
+        if place.addition.key in added and limit and value / limit > AT_LIMIT:
+            names.append(" on ".join(place.addition.key))
+    return names
