@@ -22,7 +22,7 @@ bags: # the simulated recordings in bags/, made anew
 thesis: # the thesis's simulated experiments run again: docs/thesis.md
 	@tools/env python -m crash_estimator.thesis
 
-benchmark: # every promised speed beside its reference, 5 minutes: docs/benchmark.md; ARGS="--quick"
+benchmark: # every promised speed beside its reference, 8 minutes: docs/benchmark.md; ARGS="--quick"
 	@tools/setup
 	@.venv/bin/pip install -q --no-deps --no-build-isolation -r tools/benchmark-requirements.txt || true
 	@tools/env python -m crash_estimator.benchmarks.speed $(ARGS)

@@ -4,9 +4,10 @@ import json
 
 import numpy as np
 import pytest
-from builtin_interfaces.msg import Time
+from crash_msgs.msg import Forces, Parameters, Residuals
 from helpers_estimation import oscillator, oscillator_recording
 from numpy.testing import assert_array_equal
+from rclpy.serialization import deserialize_message
 
 from crash_estimator.cli.common import write_json
 from crash_estimator.cli.estimate import as_json
@@ -37,8 +38,9 @@ def found(request):
 
 
 def messages(description, estimates):
-    make = EstimateMessages(description)
-    return tuple(kind(Time(), 0, columns_of(estimates)) for kind in (make.parameters, make.residuals, make.forces))
+    make, columns = EstimateMessages(description), columns_of(estimates)
+    said = {Parameters: make.parameters, Residuals: make.residuals, Forces: make.forces}
+    return tuple(deserialize_message(of_kind(0, 0, columns), kind) for kind, of_kind in said.items())
 
 
 def test_it_travels_after_the_parameters_with_name_unit_and_sigma(found):

@@ -112,8 +112,9 @@ def test_killed_and_started_again_it_goes_on_as_if_nothing_had_been(stage, recor
     stage.spin_until(lambda: len(victim["parameters"]) > 100, "the victim has begun")
     process.kill()
     process.wait()
-    there, without = listeners(stage), len(witness["parameters"]) + 200
-    stage.spin_until(lambda: len(witness["parameters"]) > without, "the replay has gone on without it")
+    there = listeners(stage)
+    gone_on = lambda: len(witness["parameters"]) > len(victim["parameters"]) + 200  # noqa: E731
+    stage.spin_until(gone_on, "the replay has gone on without it")
     assert stage.call(Trigger, "replay/pause").success
     before = len(victim["parameters"])
     stage.start("crash_estimator.nodes.estimator_node", "victim", model=MODEL, method="mrls")

@@ -13,7 +13,7 @@ from helpers_waiting import PATIENCE
 from numpy.testing import assert_array_equal
 
 from crash_estimator.core.methods import make_estimator
-from crash_estimator.nodes import estimator_node
+from crash_estimator.nodes import estimator_model
 from crash_replay.qos import LATCHED
 from crash_replay.recording import Recording, Test
 from crash_replay.ros_messages import stamp_ns
@@ -189,7 +189,7 @@ def spoil(monkeypatch):
 
     def install(change):
         spoiled = lambda *args, **settings: Spoiled(make_estimator(*args, **settings), change)  # noqa: E731
-        monkeypatch.setattr(estimator_node, "make_estimator", spoiled)
+        monkeypatch.setattr(estimator_model, "make_estimator", spoiled)
 
     return install
 

@@ -6,15 +6,15 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from pathlib import Path
 
 from helpers_replay import environment
 from mcap.reader import make_reader
 
+from crash_estimator.benchmarks.speed_lockstep import burning
 from crash_replay.lockstep import Answered, Lockstep
 
-BURNER = "while True: sum(range(10**6))"
 ROOT = Path(__file__).resolve().parent.parent
 
 
@@ -83,10 +83,22 @@ def test_one_killed_and_started_again_under_its_name_owes_nothing_of_before():
     assert listeners.warnings == ["/a has been started again, the replay no longer waits for what it owed before"]
     lockstep.expect(0, 8)
     listeners.processes["/a"].remove(b"first")
-    assert not lockstep.has_room(time.perf_counter() + 1.0)
+    assert not lockstep.has_room(time.perf_counter() + 0.5)
     lockstep.answer("/a", Answered(0, 8, 0))
     assert lockstep.has_room(0.0)
     assert len(listeners.warnings) == 1
+
+
+def test_who_is_waited_for_is_said_within_a_second_and_once():
+    listeners = Listeners("/a", "/b")
+    lockstep = listeners.lockstep()
+    for number in (7, 8):
+        lockstep.expect(2, number)
+        lockstep.answer("/a", Answered(2, number, 0))
+        for later in (0.5, 0.9, 1.5):
+            assert not lockstep.has_room(time.perf_counter() + later)
+            assert len(listeners.warnings) == (later > 0.5 or number == 8)
+    assert listeners.warnings == ["waiting for /b to answer sample 7 of run 2"]
 
 
 def test_a_silent_one_is_gone_on_without_until_it_answers_again():
@@ -117,18 +129,6 @@ def test_runs_with_load_and_without_record_the_same_bytes(tmp_path):
     with files[0].open("rb") as stream:
         topics = Counter(channel.topic for _, channel, _ in make_reader(stream).iter_messages())
     assert [topics[name] for name in ("/samples", "/mrls/parameters", "/constrained_kalman/parameters")] == [121] * 3
-
-
-@contextmanager
-def burning():
-    """All cores busy with something else."""
-    processes = [subprocess.Popen([sys.executable, "-c", BURNER]) for _ in range(os.cpu_count() or 1)]
-    try:
-        yield
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
 
 
 def run_recorded_to(file: Path) -> str:

@@ -15,7 +15,7 @@ class Publisher:
 
 def flow_of(*publishers: Publisher) -> tuple[Flow, list[str]]:
     warnings = []
-    return Flow(lambda: publishers, warnings.append), warnings
+    return Flow(lambda: publishers, warnings.append, lambda: "/slow"), warnings
 
 
 def test_it_has_room_for_so_many_messages_more_while_the_clock_is_kept():
@@ -85,6 +85,24 @@ def test_few_messages_are_not_asked_after():
     assert publisher.asked == 0
 
 
+def test_who_is_waited_for_is_said_within_a_second_and_not_with_every_message():
+    publisher = Publisher()
+    flow, warnings = flow_of(publisher)
+    for k in range(20):  # a slow one takes 1 s each time
+        publisher.acknowledged = False
+        flow.sent(LATE, 0)
+        began = 50.0 + k
+        assert not flow.has_room(began, on_time=False)
+        assert warnings or not k
+        assert not flow.has_room(began + 0.9, on_time=False)
+        assert warnings == ["what was sent is not taken: waiting for /slow"]
+        publisher.acknowledged = True
+        assert flow.has_room(began + 0.95, on_time=False)
+    publisher.acknowledged = False
+    assert not flow.all_taken(150.0) and not flow.all_taken(150.9)
+    assert len(warnings) == 2
+
+
 def test_it_says_so_when_a_subscriber_takes_nothing_and_goes_on():
     publisher = Publisher()
     publisher.acknowledged = False
@@ -92,8 +110,8 @@ def test_it_says_so_when_a_subscriber_takes_nothing_and_goes_on():
     flow.sent(LATE, 0)
     assert not flow.has_room(50.0, on_time=False)
     assert not flow.has_room(50.0 + 0.99 * PATIENCE, on_time=False)
-    assert warnings == []
+    assert warnings == ["what was sent is not taken: waiting for /slow"]
     assert flow.has_room(50.0 + 1.01 * PATIENCE, on_time=False)
-    assert warnings == ["a subscriber has taken nothing for 10 s: going on, it may lose samples"]
+    assert warnings[1:] == ["a subscriber has taken nothing for 10 s: going on, it may lose samples"]
     flow.sent(LATE, 0)
     assert not flow.has_room(70.0, on_time=False)

@@ -117,12 +117,13 @@ def test_what_is_lost_on_the_way_is_said(stage, whole):
 def test_the_replay_itself_is_not_made_to_send_channels(stage, whole):
     """Where `samples` come the channels are not listened to."""
     stage.add_estimator(model=MODEL, method="mrls")
-    stage.replay(BAG, wait_for=1, rate=1.0, block=20, until=0.02)
+    stage.replay(BAG, wait_for=1, rate=1.0, block=20, until=0.02, keep_alive=True)
     heard = stage.wait_for("estimator", 5)
-    listeners = [
-        stage.node.count_subscribers(topic)
-        for topic, _ in stage.node.get_topic_names_and_types()
-        if topic.startswith("/channels/")
-    ]
-    assert len(listeners) == CHANNELS and not any(listeners)
+
+    def channels() -> list[str]:
+        return [topic for topic, _ in stage.node.get_topic_names_and_types() if topic.startswith("/channels/")]
+
+    stage.spin_until(lambda: len(channels()) == CHANNELS, "the replay's channels are found")
+    stage.spin(0.3)  # the estimator looks for them ten times a second
+    assert not any(stage.node.count_subscribers(topic) for topic in channels())
     assert_array_equal(joined(heard["parameters"], "value"), whole[: sum(len(m.time_ns) for m in heard["parameters"])])

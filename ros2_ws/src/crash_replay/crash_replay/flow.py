@@ -15,6 +15,9 @@ LATE = 80
 heartbeat Fast DDS searches what a reader holds: at 500 that takes longer than what is done with a message."""
 BYTES = 250_000
 """Bytes that may be on their way: half of what Fast DDS holds between processes; what exceeds it is sent again."""
+SAY_AFTER, SAY_AGAIN = 0.8, 30.0
+"""Seconds of waiting after which it is said who for: one that was killed is waited for until its lease ends, 5 s.
+Seconds between two such lines: one that is slow is waited for again and again."""
 PATIENCE = 10.0
 """Seconds to wait for a subscriber that takes nothing; one that was killed is gone before."""
 
@@ -27,14 +30,20 @@ class Flow:
     """
 
     def __init__(
-        self, publishers: Callable[[], Sequence[Publisher]], warn: Callable[[str], None], depth: int = STREAM.depth
+        self,
+        publishers: Callable[[], Sequence[Publisher]],
+        warn: Callable[[str], None],
+        waited_for: Callable[[], str] = lambda: "a subscriber",
+        depth: int = STREAM.depth,
     ):
-        """depth: messages that each publisher holds for those who have not got them yet."""
-        self.publishers, self.warn = publishers, warn
+        """waited_for: who may be holding up; depth: messages that each publisher holds for those who have not got them
+        yet."""
+        self.publishers, self.warn, self.waited_for = publishers, warn, waited_for
         most = max(1, depth * ON_TIME // STREAM.depth)
         self.most = {True: min(ON_TIME, most), False: min(LATE, most)}  # by whether the clock is kept
         self.messages = self.bytes = 0  # since all was acknowledged
         self.waiting_since: float | None = None
+        self.said = -SAY_AGAIN  # when, who for
 
     def sent(self, messages: int, size: int) -> None:
         self.messages += messages
@@ -49,16 +58,25 @@ class Flow:
         """Whether more may be sent at the wall time `now`. Never waits: rclpy's own waiting stops all other threads."""
         if self.messages < self.most[on_time] and self.bytes < BYTES:
             return True
-        if self.acknowledged():
-            self._start_anew()
+        if self.all_taken(now):
             return True
-        if self.waiting_since is None:
-            self.waiting_since = now
         if now - self.waiting_since < PATIENCE:
             return False
         self.warn(f"a subscriber has taken nothing for {PATIENCE:g} s: going on, it may lose samples")
         self._start_anew()
         return True
+
+    def all_taken(self, now: float) -> bool:
+        """Whether all that was sent is acknowledged; where that takes long, it is said who it hangs on."""
+        if self.acknowledged():
+            self._start_anew()
+            return True
+        if self.waiting_since is None:
+            self.waiting_since = now
+        if now - self.waiting_since > SAY_AFTER and now - self.said > SAY_AGAIN:
+            self.said = now
+            self.warn(f"what was sent is not taken: waiting for {self.waited_for()}")
+        return False
 
     def acknowledged(self) -> bool:
         """Whether every reliable subscriber has got everything."""

@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 LOOK_AFTER = 0.2
 """Seconds without an answer after which to look whether the listener is still there."""
+SAY_AFTER = 0.8
+"""Seconds without an answer after which it is said, once, whose is missing."""
 
 
 class Answered(NamedTuple):
@@ -34,6 +36,7 @@ class Lockstep:
         self.changed = Condition()
         self.known: Listeners = {}
         self.dropped: set[str] = set()  # there, but silent
+        self.said: set[str] = set()  # those who have been waited for so long
         self.owing: set[str] = set()  # those whose answer to the last samples is still to come
         self.answers: dict[str, Answered] = {}
         self.last = (0, -1)  # run and number of the last sample sent
@@ -48,6 +51,7 @@ class Lockstep:
             self.known = there
             self.owing -= gone | again
             self.dropped -= gone | again
+            self.said -= gone | again
         for name in sorted(gone):
             self.warn(f"{name} has gone, the replay no longer waits for it")
         for name in sorted(again):
@@ -82,6 +86,8 @@ class Lockstep:
             self.find_listeners()
             if self.owing and now - self.since > self.patience:
                 self._drop()
+            elif now - self.since > SAY_AFTER:
+                self._say()
         return not self.owing
 
     def wait(self, seconds: float) -> None:
@@ -89,6 +95,13 @@ class Lockstep:
         with self.changed:
             if self.owing:
                 self.changed.wait(seconds)
+
+    def _say(self) -> None:
+        run, number = self.last
+        late = sorted(self.owing - self.said)
+        self.said |= set(late)
+        if late:
+            self.warn(f"waiting for {', '.join(late)} to answer sample {number} of run {run}")
 
     def _drop(self) -> None:
         with self.changed:

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from .player import Batch, CommandError, Mode, Player, Tally, suitable_block
 from .recording import Recording
+from .scheduling import sleep_exactly
 
 STATE_PERIOD = 0.1
 """Seconds between two reports of the state while nothing changes."""
@@ -95,6 +96,7 @@ class Pacing:
 
     def play(self, keep_alive: bool = False) -> None:
         """Send what is due until a signal stops it or, without keep_alive, the last sample is sent."""
+        sleep_exactly()
         while not self.stopped and (keep_alive or self.player.mode != Mode.FINISHED):
             player, block = self.player, self.block
             due, now = player.due(block), time.perf_counter()

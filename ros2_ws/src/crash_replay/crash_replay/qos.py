@@ -47,3 +47,11 @@ UNLATCHED = QoSProfile(
     depth=1,
 )
 """What a latched topic is subscribed to with where its publisher may not latch: rosbag2's, of a bag without QoS."""
+
+UNACKNOWLEDGED = QoSProfile(
+    reliability=ReliabilityPolicy.BEST_EFFORT,
+    durability=DurabilityPolicy.VOLATILE,
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+)
+"""To hear that something comes: whoever sends it does not wait for this subscriber."""

@@ -1,11 +1,11 @@
 """What `replay` publishes."""
 
 import time
+from functools import partial
 
 from crash_msgs.msg import Answer, ReplayState, Samples, TestInfo
 from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosgraph_msgs.msg import Clock
 
 from .flow import NOT_WAITING, Flow
@@ -14,15 +14,9 @@ from .player import SECOND, Batch, Player, Tally
 from .qos import LATCHED, SAID, STREAM
 from .recording import Recording
 from .ros_messages import channel_to_msg, channel_type, samples_to_msg, stamp, test_to_msg, time_zero_ns
+from .subscribers import UNNAMED, node_name, process_of, waited_for
 
-UNNAMED = "_NODE_NAME_UNKNOWN_"
-"""As rcl calls the node of a publisher that was found before its node was."""
 OVERRIDABLE = QoSOverridingOptions.with_default_policies()
-
-
-def process_of(endpoint: TopicEndpointInfo) -> bytes:
-    """The participant that a publisher or subscription is of: the first 12 bytes of its GUID (RTPS 2.2, 8.2.4.2)."""
-    return bytes(endpoint.endpoint_gid[:12])
 
 
 class ReplayTopics:
@@ -40,7 +34,8 @@ class ReplayTopics:
         ]
         overrides = node.get_parameters_by_prefix("qos_overrides")
         depths = [parameter.value for name, parameter in overrides.items() if name.endswith(".depth")]
-        self.flow = Flow(self._flowing, node.get_logger().warning, min([STREAM.depth, *filter(None, depths)]))
+        who = partial(waited_for, node, [self.samples, *self.channels])
+        self.flow = Flow(self._flowing, node.get_logger().warning, who, min([STREAM.depth, *filter(None, depths)]))
         self.look = self.flow.look
         self.acknowledged = 0  # samples
         self.lockstep = None
@@ -57,7 +52,7 @@ class ReplayTopics:
     def all_have_arrived(self) -> bool:
         """Whether reliable subscribers have got all samples and the last state, and in lock-step have answered."""
         answered = self.lockstep is None or self.lockstep.has_room(time.perf_counter())
-        return answered and self.flow.acknowledged() and self.state.wait_for_all_acked(NOT_WAITING)
+        return answered and self.flow.all_taken(time.perf_counter()) and self.state.wait_for_all_acked(NOT_WAITING)
 
     def has_room(self, now: float, on_time: bool) -> bool:
         """Whether more may be sent at the wall time `now`."""
@@ -81,7 +76,7 @@ class ReplayTopics:
         found: dict[str, set[bytes]] = {}
         for info in self.node.get_publishers_info_by_topic(self.answers.topic_name):
             if info.node_name != UNNAMED and process_of(info) in hearing:
-                found.setdefault(f"{info.node_namespace.rstrip('/')}/{info.node_name}", set()).add(process_of(info))
+                found.setdefault(node_name(info), set()).add(process_of(info))
         return found
 
     def _on_answer(self, message: Answer) -> None:

@@ -20,8 +20,9 @@ from .speed_row import HEAD, Row
 from .speed_steps import steps
 
 QUICK = Effort(
-    singles=0.1, blocks=0.5, rounds=1, hold=1.0, probe=0.5, rates=(2e3,), latency=200, jitter=0.3, lockstep=2
-)
+    singles=0.1, blocks=0.5, seen=0.5, turns=1, rounds=1, hold=1.0, probe=0.5, rates=(2e3,), latency=200, jitter=0.3,
+    lockstep=2,
+)  # fmt: skip
 PARTS = ("steps", "growth", "throughput", "latency", "jitter", "viewer", "real_time", "lockstep")
 
 ABOUT = """\
@@ -30,7 +31,8 @@ ABOUT = """\
 Made by `make benchmark` on {machine}, {cores} cores, load {load:.1f} before it began; {when}.
 
 Each row is measured beside its reference in the same run, in turns; a ratio holds on another machine, a time does not.
-A machine that does other work makes every row worse, those with several processes most.
+A machine that does other work makes every row worse, those with several processes most. Throughputs are medians of
+six passes in turns with the reference's, their ratio is the median of the six ratios.
 """
 
 

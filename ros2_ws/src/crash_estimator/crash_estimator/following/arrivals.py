@@ -1,5 +1,6 @@
 """What comes of a replay, told apart: the next samples, another pass over the test, samples lost or sent twice."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..kept import Rows
@@ -10,6 +11,17 @@ class Arrival(NamedTuple):
     begins: bool  # another pass over the test
     lost: int  # samples of this pass that should have come before them
     repeated: int  # samples that had come already, left out
+
+
+@dataclass
+class Waiting:
+    """Samples that have come and are to be estimated."""
+
+    arrival: Arrival
+    run: int
+    stamp_ns: int  # of the first of them
+    sent_again: int = 0  # samples that were missing before them and have been got since
+    without: bool = False  # what is missing cannot be had
 
 
 class Arrivals:
@@ -28,7 +40,7 @@ class Arrivals:
         lost, repeated = max(0, rows.number - self.next), min(max(0, self.next - rows.number), len(rows.time_ns))
         self.missed += lost
         self.next = max(self.next, rows.end)
-        return Arrival(rows.without(repeated), begins, lost, repeated)
+        return Arrival(rows.without(repeated) if repeated else rows, begins, lost, repeated)
 
 
 def missing_text(number: int, missing: int, sent_again: int, holds_from: int, joined_late: bool) -> str:

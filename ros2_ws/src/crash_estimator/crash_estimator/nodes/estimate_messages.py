@@ -2,65 +2,82 @@
 
 from array import array
 from collections.abc import Iterator, Sequence
+from functools import lru_cache, partial
 from typing import TypeVar
 
 import numpy as np
-from builtin_interfaces.msg import Time
 from crash_msgs.msg import Event, Forces, Parameters, Residuals
 
-from crash_replay.ros_messages import add_ns
+from crash_replay.cdr import Serialized
+from crash_replay.ros_messages import stamp
 
 from ..core.estimate import Description, Estimate, ParameterStatus
 from ..following.columns import Columns
 
 Message = TypeVar("Message", Parameters, Residuals, Forces)
+SIZES = 8
+"""Lengths of blocks whose messages are kept to be filled again: a replay sends one, and what is left at the end."""
 
 
 class EstimateMessages:
-    """Makes the messages of a block of estimates: one of each kind, filled again, so that it holds until the next call.
-
-    Names and units are set once, for to make a message anew costs as much as to estimate.
-    """
+    """Makes the messages of a block of estimates, serialised: what they hold besides numbers is made once."""
 
     def __init__(self, description: Description, revision: int = 0):
         d = description
         ends = ["-".join(pair) for pair in d.between]
-        self._parameters = Parameters(name=[*d.parameters, *d.extra], unit=[*d.parameter_units, *d.extra_units])
-        self._residuals = Residuals(name=list(d.equations), unit=list(d.equation_units))
-        self._forces = Forces(element=list(d.elements), between=ends, body=list(d.bodies), mass=array("d", d.masses))
-        self.description = description
-        for message in (self._parameters, self._residuals, self._forces):
+        empty = (
+            Parameters(name=[*d.parameters, *d.extra], unit=[*d.parameter_units, *d.extra_units]),
+            Residuals(name=list(d.equations), unit=list(d.equation_units)),
+            Forces(element=list(d.elements), between=ends, body=list(d.bodies), mass=array("d", d.masses)),
+        )
+        for message in empty:
             message.model, message.method, message.revision = d.model, d.method, revision
+        self.description = description
+        self._parameters, self._residuals, self._forces = (
+            lru_cache(SIZES)(partial(Tables, message)) for message in empty
+        )
 
-    def parameters(self, stamp: Time, run: int, columns: Columns) -> Parameters:
-        return _filled(self._parameters, stamp, run, columns)
+    def parameters(self, stamp_ns: int, run: int, columns: Columns) -> bytes:
+        """stamp_ns: of the first sample."""
+        return self._parameters(len(columns)).filled(stamp_ns, run, columns)
 
-    def residuals(self, stamp: Time, run: int, columns: Columns) -> Residuals:
-        return _filled(self._residuals, stamp, run, columns)
+    def residuals(self, stamp_ns: int, run: int, columns: Columns) -> bytes:
+        return self._residuals(len(columns)).filled(stamp_ns, run, columns)
 
-    def forces(self, stamp: Time, run: int, columns: Columns) -> Forces:
-        return _filled(self._forces, stamp, run, columns)
+    def forces(self, stamp_ns: int, run: int, columns: Columns) -> bytes:
+        return self._forces(len(columns)).filled(stamp_ns, run, columns)
 
-    def events(self, stamp: Time, run: int, columns: Columns) -> list[Event]:
-        """stamp: of the first sample."""
+    def events(self, stamp_ns: int, run: int, columns: Columns) -> list[Event]:
         messages = []
         for row, event in columns.events:
             time_ns = int(columns.time_ns[row])
             message = Event(run=run, number=columns.number + row, time=time_ns * 1e-9, **event._asdict())
-            message.header.stamp = add_ns(stamp, time_ns - int(columns.time_ns[0]))
+            message.header.stamp = stamp(stamp_ns + time_ns - int(columns.time_ns[0]))
             messages.append(message)
         return messages
 
 
-def _filled(message: Message, stamp: Time, run: int, columns: Columns) -> Message:
-    message.header.stamp = stamp
-    message.run = run
-    message.number = columns.number
-    message.time_ns = array("q", columns.time_ns.tobytes())
-    for field in FIELDS[type(message)]:
-        table = columns.of[field]
-        setattr(message, field, array("B" if table.dtype == np.uint8 else "d", table.tobytes()))
-    return message
+class Tables:
+    """A serialised message on so many samples, filled again."""
+
+    def __init__(self, empty: Message, samples: int):
+        names, bodies = (len(getattr(empty, field)) for field in NAMES[type(empty)])
+        empty.time_ns = array("q", bytes(8 * samples))
+        for field in FIELDS[type(empty)]:
+            count = samples * (bodies if field in OF_BODIES else names)
+            setattr(empty, field, array("B", bytes(count)) if field in BYTES else array("d", bytes(8 * count)))
+        self.message = Serialized(empty)
+        numbers = self.message.numbers
+        self.run, self.number, self.time_ns = numbers["run"], numbers["number"], numbers["time_ns"]
+        self.tables = [(field, numbers[field].reshape(samples, -1)) for field in FIELDS[type(empty)]]
+
+    def filled(self, stamp_ns: int, run: int, columns: Columns) -> bytes:
+        self.message.set_stamp(stamp_ns)
+        self.run[0], self.number[0] = run, columns.number
+        self.time_ns[:] = columns.time_ns
+        for field, table in self.tables:
+            table[:] = columns.of[field]
+        return bytes(self.message)
 
 
 def description_from(parameters: Parameters, residuals: Residuals, forces: Forces) -> Description:
@@ -121,6 +138,10 @@ FIELDS = {
     Forces: ("crush", "rate", "force", "force_std", "state", "displacement", "velocity", "acceleration"),
 }
 """Those with one row a sample."""
+NAMES = {Parameters: ("name", "name"), Residuals: ("name", "name"), Forces: ("element", "body")}
+"""What a row has values of: most fields, those in OF_BODIES."""
+OF_BODIES = ("displacement", "velocity", "acceleration")
+BYTES = ("status", "state")
 
 
 def _samples(message: Parameters | Residuals | Forces) -> Iterator[tuple[int, dict]]:

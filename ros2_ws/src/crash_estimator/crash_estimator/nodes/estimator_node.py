@@ -8,68 +8,49 @@ Several run side by side under different names (`--ros-args -r __node:=mrls`).
 import sys
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 
-import numpy as np
-from builtin_interfaces.msg import Time
-from crash_msgs.msg import EstimatorState, Samples, TestInfo
+from crash_msgs.msg import Samples, TestInfo
 from crash_msgs.srv import AddEffect, RemoveEffect
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from crash_replay.qos import EVERY_SAMPLE, LATCHED, UNLATCHED
-from crash_replay.recording import Channel, RecordingError, Test
-from crash_replay.ros_messages import add_ns, test_from_msg
+from crash_replay.recording import RecordingError
+from crash_replay.ros_messages import test_from_msg
 from crash_replay.ros_runtime import run
 
-from ..cli.common import parse_settings
-from ..core.effects import EFFECTS
 from ..core.effects.change import remove_effect
-from ..core.effects.user import load_effects
-from ..core.methods import METHODS, AnyEstimator, make_estimator
+from ..core.methods import METHODS
 from ..core.structure import ModelError, Structure
 from ..following.again import estimated_again
-from ..following.arrivals import Arrival, Arrivals, missing_text
+from ..following.arrivals import Arrivals, Waiting, missing_text
 from ..following.columns import FilterFailure
 from ..following.follower import Follower
 from ..kept import Kept, Rows
-from ..model_file import load_model, ready_models
+from ..model_file import ready_models
 from .asking import Asking
 from .channel_feed import ChannelFeed
 from .effect_requests import with_effect
+from .estimator_model import EstimatorModel
 from .estimator_topics import EstimatorTopics
-from .samples import MOST, rows_of, what_is_wrong
-
-
-@dataclass
-class Waiting:
-    """Samples that have come and are to be estimated."""
-
-    arrival: Arrival
-    run: int
-    stamp: Time  # of the first of them
-    sent_again: int = 0  # samples that were missing before them and have been got since
-    without: bool = False  # what is missing cannot be had
+from .samples import MOST, Received, received, rows_of, what_is_wrong
 
 
 class EstimatorNode(Node):
     def __init__(self, **options) -> None:
         """options: of rclpy's Node, such as parameter_overrides. Raises ModelError with one line."""
         super().__init__("estimator", **options)
-        self.method = self._declared("method", "constrained_kalman", f"one of {', '.join(METHODS)}")
-        model = self._declared("model", "", f"a .yaml file, or one of {', '.join(ready_models())}")
-        settings = self._declared("settings", [""], "settings of the method, such as forgetting=0.98")
-        effects = self._declared("effects", "", "your own effects, a .py file; it is executed")
+        self.model = EstimatorModel(
+            method=self._declared("method", "constrained_kalman", f"one of {', '.join(METHODS)}"),
+            model=self._declared("model", "", f"a .yaml file, or one of {', '.join(ready_models())}"),
+            settings=self._declared("settings", [""], "settings of the method, such as forgetting=0.98"),
+            effects=self._declared("effects", "", "your own effects, a .py file; it is executed"),
+            effective_mass=self._declared(
+                "effective_mass", False, "find the masses that go with the accelerometers first"
+            ),
+        )
         replay = self._declared("replay", "replay", "node that samples are asked of which were missed")
-        self.settings = parse_settings([pair for pair in settings if pair])
-        if self._declared("effective_mass", False, "find the masses that go with the accelerometers first"):
-            self.settings["effective_mass"] = True
-        if not model:
-            raise ModelError(f"parameter model is not set: give a .yaml file, or one of {', '.join(ready_models())}")
-        self.effects = EFFECTS | (load_effects(effects) if effects else {})
-        self.structure, self.revision = load_model(model), 0
-        self._try_out(self.structure)
         self.test_message: TestInfo | None = None
         self.unlatched: TestInfo | None = None  # come by itself, and to come once more if its publisher latches
         self.follower: Follower | None = None  # None: no test yet, or one that the model does not fit
@@ -84,25 +65,10 @@ class EstimatorNode(Node):
         self.feed, self.feed_run = ChannelFeed(self, "samples", self._on_feed_begins, self._on_feed), -1
         self.create_subscription(TestInfo, "test", self._on_test, LATCHED)
         self.create_subscription(TestInfo, "test", self._on_unlatched_test, UNLATCHED)
-        self.create_subscription(Samples, "samples", self._on_samples, EVERY_SAMPLE)
+        self.create_subscription(Samples, "samples", self._on_samples, EVERY_SAMPLE, raw=True)
 
     def _declared(self, name: str, default, description: str):
         return self.declare_parameter(name, default, ParameterDescriptor(description=description)).value
-
-    def _make(self, structure: Structure, test: Test) -> AnyEstimator:
-        return make_estimator(structure, test, self.method, effects=self.effects, **self.settings)
-
-    def _try_out(self, structure: Structure) -> None:
-        """One sample of a test that has just the model's channels: what is wrong with model or method shows now.
-
-        It also gets the compiled code ready before the subscription that a replay waits for.
-        """
-        channels = {name: Channel(name, quantity) for _, name, quantity in structure.channels()}
-        test = Test("try-out", tuple(channels.values()))
-        rows = Rows(0, np.zeros(1, dtype=np.int64), np.zeros((1, len(channels))))
-        follower = Follower(self._make(structure, test), Kept(test))
-        follower.keep(rows)
-        follower.follow(rows)
 
     def _on_unlatched_test(self, message: TestInfo) -> None:
         """From a publisher that latches nothing: rosbag2's, of a bag without quality of service."""
@@ -122,21 +88,22 @@ class EstimatorNode(Node):
         self.arrivals = Arrivals()
         try:
             test = test_from_msg(message)
-            estimator = self._make(self.structure, test)
+            estimator = self.model.estimator(self.model.structure, test)
         except (ModelError, RecordingError) as error:
             self.get_logger().error(f"{error}; nothing is estimated on this test")
             return
         self.follower = Follower(estimator, Kept(test, message.samples))
-        self.topics.begin(estimator.description, self.revision, message.time_zero)
-        self.get_logger().info(f"test {test.id}: model {self.structure.name}, method {self.method}")
+        self.topics.begin(estimator.description, self.model.revision, message.time_zero)
+        self.get_logger().info(f"test {test.id}: model {self.model.structure.name}, method {self.model.method}")
         self.feed.set_test(message)
 
-    def _on_samples(self, message: Samples) -> None:
+    def _on_samples(self, raw: bytes) -> None:
+        message = received(raw)
         if self.follower is None or not self._fits(message):
             return self._answer(message.run, message.number + max(0, len(message.time_ns) - 1))
-        self._receive(message.run, rows_of(message), message.header.stamp)
+        self._receive(message.run, rows_of(message), message.stamp_ns)
 
-    def _fits(self, message: Samples) -> bool:
+    def _fits(self, message: Received) -> bool:
         wrong = what_is_wrong(message, len(self.follower.kept.test.channels), self.test_message.samples)
         if wrong:
             self.get_logger().error(
@@ -152,9 +119,9 @@ class EstimatorNode(Node):
 
     def _on_feed(self, rows: Rows) -> None:
         if self.follower and rows.end <= MOST:
-            self._receive(self.feed_run, rows, add_ns(self.test_message.time_zero, int(rows.time_ns[0])))
+            self._receive(self.feed_run, rows, self.topics.time_zero + int(rows.time_ns[0]))
 
-    def _receive(self, run: int, rows: Rows, stamp: Time) -> None:
+    def _receive(self, run: int, rows: Rows, stamp_ns: int) -> None:
         arrival = self.arrivals.receive(run, rows)
         if arrival.repeated:
             self.get_logger().warning(
@@ -163,9 +130,9 @@ class EstimatorNode(Node):
             )
             if not len(arrival.rows.time_ns):
                 return self._answer(run, rows.end - 1)
-            stamp = add_ns(stamp, int(arrival.rows.time_ns[0] - rows.time_ns[0]))
+            stamp_ns += int(arrival.rows.time_ns[0] - rows.time_ns[0])
         self.follower.keep(arrival.rows)
-        self.waiting.append(Waiting(arrival, run, stamp))
+        self.waiting.append(Waiting(arrival, run, stamp_ns))
         self._work()
 
     def _on_samples_again(self, rows: Rows | None) -> None:
@@ -213,7 +180,7 @@ class EstimatorNode(Node):
                 f"{failure}; it starts again with the next pass over the test, or with the service ~/reset"
             )
         if columns:
-            self.topics.estimates(samples.run, columns, samples.stamp)
+            self.topics.estimates(samples.run, columns, samples.stamp_ns)
 
     def _answer(self, run: int, number: int) -> None:
         self.topics.answer(run, number, self.arrivals.missed)
@@ -228,53 +195,40 @@ class EstimatorNode(Node):
         if missing:
             text = missing_text(number, missing, samples.sent_again, holds_from, arrival.begins)
             self.get_logger().warning(text)
-            self.topics.event("lost", "samples", float(missing), text, samples.run, number, samples.stamp)
-        self._publish_state(samples.run, number, samples.stamp)
+            self.topics.event("lost", "samples", float(missing), text, samples.run, number, samples.stamp_ns)
+        self._publish_state(samples.run, number, samples.stamp_ns)
 
-    def _publish_state(self, run: int, number: int, stamp: Time) -> None:
-        message = EstimatorState(
-            run=run,
-            number=number,
-            holds_from=self.follower.holds_from(number),
-            missed=self.arrivals.missed,
-            asked_again=self.asked_again,
-            model=self.structure.name,
-            method=self.method,
-            revision=self.revision,
-            effects=self._effects(),
-        )
-        message.header.stamp = stamp
-        self.topics.state.publish(message)
-
-    def _effects(self) -> list[str]:
-        return [f"{spec.type} on {spec.target}" for spec in self.structure.effects]
+    def _publish_state(self, run: int, number: int, stamp_ns: int) -> None:
+        counts = {"missed": self.arrivals.missed, "asked_again": self.asked_again}
+        self.topics.tell_state(self.model, run, number, stamp_ns, holds_from=self.follower.holds_from(number), **counts)
 
     def _on_add_effect(self, request: AddEffect.Request, response: AddEffect.Response) -> AddEffect.Response:
-        test = self.follower.kept.test if self.follower else None
-        return self._change(lambda: with_effect(self.structure, request, self.effects, test), response)
+        test, model = self.follower.kept.test if self.follower else None, self.model
+        return self._change(lambda: with_effect(model.structure, request, model.known_effects, test), response)
 
     def _on_remove_effect(
         self, request: RemoveEffect.Request, response: RemoveEffect.Response
     ) -> RemoveEffect.Response:
-        return self._change(lambda: remove_effect(self.structure, request.effect, request.target), response)
+        return self._change(lambda: remove_effect(self.model.structure, request.effect, request.target), response)
 
     def _change(self, change: Callable[[], Structure], response):
         """Go on with another model, as if it had been this one from the first sample on."""
         old, done = self.follower, ""
         try:
             structure = change()
-            self._try_out(structure)
+            self.model.try_out(structure)
             if old:
-                self.follower, done = estimated_again(old, self._make(structure, old.kept.test))
+                self.follower, done = estimated_again(old, self.model.estimator(structure, old.kept.test))
         except (ModelError, RecordingError) as error:
             response.message = " ".join(str(error).split())
             return response
         except FilterFailure as failure:
-            response.message = f"{failure}: model {self.structure.name} stays as it is"
+            response.message = f"{failure}: model {self.model.structure.name} stays as it is"
             return response
-        self.structure, self.revision, self.stopped = structure, self.revision + 1, False
-        name = f"{structure.name} with {', '.join(self._effects()) or 'no effect'}"
-        response.success, response.message = True, f"revision {self.revision}: {name}" + (f"; {done}" if done else "")
+        self.model.revise(structure)
+        self.stopped = False
+        name = f"revision {self.model.revision}: {structure.name} with {', '.join(self.model.effects()) or 'no effect'}"
+        response.success, response.message = True, name + (f"; {done}" if done else "")
         self.get_logger().info(response.message)
         if old:
             self._tell_of_change(response.message)
@@ -283,10 +237,10 @@ class EstimatorNode(Node):
         return response
 
     def _tell_of_change(self, text: str) -> None:
-        zero, number, run = self.test_message.time_zero, self.follower.position, self.arrivals.run
-        at = add_ns(zero, int(self.follower.kept.time_ns[max(0, number - 1)]))
-        self.topics.begin(self.follower.estimator.description, self.revision, zero)
-        self.topics.event("effect", "model", float(self.revision), text, run, number, at)
+        number, run, revision = self.follower.position, self.arrivals.run, self.model.revision
+        self.topics.begin(self.follower.estimator.description, revision, self.test_message.time_zero)
+        at = self.topics.time_zero + int(self.follower.kept.time_ns[max(0, number - 1)])
+        self.topics.event("effect", "model", float(revision), text, run, number, at)
         self._publish_state(run, number, at)
 
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -1,30 +1,35 @@
 """What `estimator` publishes."""
 
 import time
+from functools import partial
 
 from builtin_interfaces.msg import Time
 from crash_msgs.msg import Answer, EstimatorState, Event, Forces, Parameters, Residuals
 from rclpy.node import Node
 
+from crash_replay.cdr import Serialized
 from crash_replay.flow import Flow
 from crash_replay.qos import LATCHED, STREAM
-from crash_replay.ros_messages import stamp_ns
+from crash_replay.ros_messages import stamp, stamp_ns
+from crash_replay.subscribers import waited_for
 
 from ..core.estimate import Description
 from ..following.columns import Columns
 from .estimate_messages import EstimateMessages
+from .estimator_model import EstimatorModel
 
 
 class EstimatorTopics:
     def __init__(self, node: Node):
-        self.name = node.get_fully_qualified_name()
         self.parameters = node.create_publisher(Parameters, "~/parameters", STREAM)
         self.residuals = node.create_publisher(Residuals, "~/residuals", STREAM)
         self.forces = node.create_publisher(Forces, "~/forces", STREAM)
         self.events = node.create_publisher(Event, "~/events", STREAM)
         self.state = node.create_publisher(EstimatorState, "~/state", LATCHED)
         self.answers = node.create_publisher(Answer, "answers", LATCHED)  # a replay that finds it late gets the last
-        self.flow = Flow(lambda: (self.parameters, self.residuals, self.forces), node.get_logger().warning)
+        self.answered = Serialized(Answer(node=node.get_fully_qualified_name()))
+        streams = (self.parameters, self.residuals, self.forces)
+        self.flow = Flow(lambda: streams, node.get_logger().warning, partial(waited_for, node, streams))
         self.messages: EstimateMessages | None = None
         self.time_zero = 0  # stamp of the impact, ns
 
@@ -32,24 +37,33 @@ class EstimatorTopics:
         """What follows comes from this model on this test."""
         self.messages, self.time_zero = EstimateMessages(description, revision), stamp_ns(time_zero)
 
-    def estimates(self, run: int, columns: Columns, stamp: Time) -> None:
-        """stamp: of the first of the samples. Waits while those who keep all have not taken what was said before."""
+    def estimates(self, run: int, columns: Columns, stamp_ns: int) -> None:
+        """stamp_ns: of the first of the samples. Waits while those who keep all have not taken what was said before."""
         while not self.flow.has_room(time.perf_counter(), on_time=True):
             time.sleep(0.0005)
-        self.parameters.publish(self.messages.parameters(stamp, run, columns))
-        self.residuals.publish(self.messages.residuals(stamp, run, columns))
+        self.parameters.publish(self.messages.parameters(stamp_ns, run, columns))
+        self.residuals.publish(self.messages.residuals(stamp_ns, run, columns))
         if self.forces.get_subscription_count():
-            self.forces.publish(self.messages.forces(stamp, run, columns))
+            self.forces.publish(self.messages.forces(stamp_ns, run, columns))
         self.flow.sent(1, 0)
-        for event in self.messages.events(stamp, run, columns):
+        for event in self.messages.events(stamp_ns, run, columns):
             self.events.publish(event)
 
-    def event(self, kind: str, target: str, value: float, text: str, run: int, number: int, stamp: Time) -> None:
-        time = (stamp_ns(stamp) - self.time_zero) * 1e-9
+    def event(self, kind: str, target: str, value: float, text: str, run: int, number: int, stamp_ns: int) -> None:
+        time = (stamp_ns - self.time_zero) * 1e-9
         message = Event(run=run, number=number, time=time, kind=kind, target=target, value=value, text=text)
-        message.header.stamp = stamp
+        message.header.stamp = stamp(stamp_ns)
         self.events.publish(message)
+
+    def tell_state(self, model: EstimatorModel, run: int, number: int, stamp_ns: int, **counts: int) -> None:
+        """counts: the other numbers of an EstimatorState, by their fields."""
+        names = {"model": model.structure.name, "method": model.method, "effects": model.effects()}
+        message = EstimatorState(run=run, number=number, revision=model.revision, **names, **counts)
+        message.header.stamp = stamp(stamp_ns)
+        self.state.publish(message)
 
     def answer(self, run: int, number: int, missed: int) -> None:
         """All that there is to say on the samples up to this one is published."""
-        self.answers.publish(Answer(node=self.name, run=run, number=number, missed=missed))
+        fields = self.answered.numbers
+        fields["run"][0], fields["number"][0], fields["missed"][0] = run, number, missed
+        self.answers.publish(bytes(self.answered))

@@ -19,7 +19,7 @@ from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
-from crash_replay.qos import LATCHED, SAID, STREAM
+from crash_replay.qos import LATCHED, SAID, STREAM, UNACKNOWLEDGED
 from crash_replay.ros_runtime import run
 
 from ..core.structure import Structure
@@ -92,7 +92,7 @@ class ViewerNode(Node):
             self.inputs.append(self.create_subscription(kind, f"{name}/{topic}", queue, STREAM, raw=True))
 
     def _queue(self, kind: type, make: Callable, stream: Hashable, raw: bytes) -> None:
-        self.recorder.put(lambda: make(deserialize_message(raw, kind)), stream)
+        self.recorder.put(lambda: make(deserialize_message(raw, kind)), stream, len(raw))
 
     def _on_test(self, message: TestInfo) -> None:
         self.recorder.put(partial(test_block, message))
@@ -132,7 +132,8 @@ class ViewerNode(Node):
             if not all(subscription.get_publisher_count() for subscription in self.inputs):
                 self.heard_since = time.monotonic()
             elif time.monotonic() - self.heard_since > SETTLED:
-                self.counted = self.create_subscription(Samples, "samples", self._on_first_sample, STREAM, raw=True)
+                begun = self._on_first_sample
+                self.counted = self.create_subscription(Samples, "samples", begun, UNACKNOWLEDGED, raw=True)
 
     def _on_first_sample(self, _raw: bytes) -> None:
         self.replay_goes_on = True

@@ -6,6 +6,8 @@ from collections import Counter, deque
 from collections.abc import Callable, Hashable
 from typing import NamedTuple
 
+from crash_replay.scheduling import step_back
+
 from ..core.structure import Structure
 from .blocks import Block, EventBlock, TestBlock
 from .findings import Finding
@@ -21,6 +23,14 @@ PERIOD = 0.05
 SHARE = 0.2
 """Of the time that writing may take: the longer a batch takes, the rarer, larger and so cheaper they become."""
 
+RUSH, HOLD = 40e6, 256e6
+"""While more than RUSH bytes come in a second, drawing is put off until HOLD bytes wait: nobody can look at what goes
+by so fast. Two estimators at 20 kHz say half as much in real time, and are drawn as they speak."""
+BACK = 10
+"""Niceness of the viewer meanwhile."""
+MOST = 2.0 * HOLD
+"""Bytes that wait at most while others are drawn; beyond that, curves become coarser."""
+
 AT_THE_END = 30_000
 """Items that are written within about two seconds when the end has come."""
 
@@ -31,6 +41,7 @@ class Entry(NamedTuple):
     stream: Hashable  # None: not to be left out
     index: int  # in its stream
     make: Make
+    size: int  # bytes
 
 
 class Recorder:
@@ -56,6 +67,9 @@ class Recorder:
         self._guard = threading.Lock()
         self._stop = threading.Event()
         self._busy = False
+        self._held = 0  # bytes in the queue
+        self._came, self._looked = 0, self.last_put  # bytes since then
+        self._rush = False
         self._test: TestBlock | None = None
         self._replay = 0  # a replay that is started again counts its runs from 0 again
         self._passes: dict[tuple[int, int], Pass] = {}  # by (replay, run), the newest last
@@ -64,8 +78,10 @@ class Recorder:
         self._thread = threading.Thread(target=self._work, name="rerun", daemon=True)
         self._thread.start()
 
-    def put(self, make: Make, stream: Hashable = None) -> None:
+    def put(self, make: Make, stream: Hashable = None, size: int = 0) -> None:
         """Hand over what makes an item; it is called in the recorder's thread, so decoding costs the caller nothing.
+
+        size: bytes that it is made of.
 
         When the queue is full every second item of each stream goes, and of those that follow until it is empty:
         coarser curves rather than a caller that waits. What belongs to no stream is kept.
@@ -74,11 +90,13 @@ class Recorder:
         with self._guard:
             index = self._counts[stream]
             self._counts[stream] += 1
-            entry = Entry(stream, index, make)
-            if len(self._queue) >= self.limit:
+            self._came += size
+            entry = Entry(stream, index, make, size)
+            if len(self._queue) >= self.limit or self._held > MOST:
                 self._thin()
             if self._is_kept(entry):
                 self._queue.append(entry)
+                self._held += size
             else:
                 self.dropped += 1
 
@@ -86,6 +104,7 @@ class Recorder:
         self._stride *= 2
         before = len(self._queue)
         self._queue = deque(filter(self._is_kept, self._queue))
+        self._held = sum(entry.size for entry in self._queue)
         self.dropped += before - len(self._queue)
 
     def _is_kept(self, entry: Entry) -> bool:
@@ -121,16 +140,29 @@ class Recorder:
     def _work(self) -> None:
         pause = PERIOD
         while not self._stop.wait(pause):
-            began = time.monotonic()
+            began, pause = time.monotonic(), PERIOD
+            if self._put_off(began):
+                continue
             self._write_batch()
             pause = max(PERIOD, (time.monotonic() - began) * (1 - SHARE) / SHARE)
         self._write_batch()
         for pass_ in reversed([*filter(None, [self._spare]), *self._passes.values()]):  # the one with the server last
             self._guarded(pass_.end)
 
+    def _put_off(self, now: float) -> bool:
+        """Whether so much comes that drawing it can wait: the estimators may need what it would take."""
+        with self._guard:
+            came, self._came = self._came, 0
+            rush, self._looked = came > RUSH * (now - self._looked), now
+            put_off = rush and self._held < HOLD
+        if rush != self._rush:
+            self._rush = rush
+            step_back(BACK if rush else 0)
+        return put_off
+
     def _write_batch(self) -> None:
         with self._guard:
-            batch, self._queue, self._stride = self._queue, deque(), 1
+            batch, self._queue, self._stride, self._held = self._queue, deque(), 1, 0
             self._busy = True
         made = [self._guarded(entry.make) for entry in batch]
         for item in made:
