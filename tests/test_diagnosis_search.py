@@ -4,6 +4,7 @@ import numpy as np
 from scipy.fft import dct, idct
 
 from crash_estimator.core.diagnosis.candidates import candidates
+from crash_estimator.core.diagnosis.diagnosis import diagnose
 from crash_estimator.core.diagnosis.model import fit_model
 from crash_estimator.core.diagnosis.records import make_record
 from crash_estimator.core.diagnosis.scales import make_scales
@@ -68,3 +69,23 @@ def test_a_motion_without_bounds_leaves_no_more_than_was_measured():
     small, wild = 0.1 * record.measured, 1e25 * record.measured
     assert bounded([small], [record])[0] is small
     assert bounded([wild], [record])[0] is record.measured
+
+
+def diagnosed(structure: str, effects: tuple[str, ...], seed: int, noise: float):
+    """From recordings at two speeds, and what was hidden."""
+    drawn = draw_case(structure, effects, seed)
+    model = ModelFile.model_validate(dict(drawn.specimen.model)).structure()
+    return diagnose(model, [drawn.record(speed, noise)[0] for speed in (0.75, 1.1)]), drawn.hidden
+
+
+def test_two_effects_are_found_of_which_neither_counts_alone():
+    """In noise as large as what one of them leaves, nothing stands out; together they leave the sensors' noise."""
+    found, hidden = diagnosed("frontal", ("quadratic_damping", "bottoming_out"), 70301, 1.0)
+    assert found.verdict == "effect_missing"
+    assert {(step.effect, step.target) for step in found.steps} == {(one.effect, one.target) for one in hidden}
+
+
+def test_what_is_not_white_in_the_sensors_noise_stays_unexplained_in_a_larger_one():
+    """A sensor that turns with its body, mimicked by an offset and a mass: the larger noise hides what they leave."""
+    found, _ = diagnosed("impactor", ("rotation",), 70619, 2.0)
+    assert found.verdict == "unexplained" and len(found.steps) == 2

@@ -27,6 +27,10 @@ NEAR_THE_FLOOR = 2.0
 """Where the residual's mean square is within this factor of the noise's, a finer curve may be all that is missing."""
 
 
+MOST_AT_ONCE = 2
+"""Effects that are believed together: what takes three of them is more likely one that is not in the vocabulary."""
+
+
 @dataclass(frozen=True)
 class Rms:
     """Root mean square of measured minus predicted over all outputs, m/s^2; None where it is not known."""
@@ -98,7 +102,8 @@ def _answer(structure: Structure, rounds: list[Round], final: Model, present: in
     runs = [free_run(model.fit, model.records).rms for model in models]
     steps = tuple(step_of(*each, final) for each in zip(rounds, models, models[1:], zip(runs, runs[1:])))[: len(added)]
     white = final.left.whiteness.white
-    verdict = ("effect_missing" if added else "adequate") if white else "unexplained"
+    explained = white and len(added) <= MOST_AT_ONCE
+    verdict = ("effect_missing" if added else "adequate") if explained else "unexplained"
     floor = noise_floor(first.fit.layout, first.records)
     ranking = ranking_of(rounds[0], len(first.records))
     return Diagnosis(
@@ -131,6 +136,8 @@ def _text(verdict: str, steps, ranking, first: Model, final: Model, floor: float
         small = first.left.rms < NEAR_THE_FLOOR**0.5 * floor
         why = f"; small, yet noise would not leave it ({steps[0].evidence:.0f} nats of evidence)" if small else ""
         return f"effect missing: {names}; {size}, now white{why}{advice}"
+    if final.left.whiteness.white:
+        return f"unexplained: {names} together leave only noise; {size}; one effect of another kind is likelier than so many"
     worst = final.left.whiteness.worst
     layout = final.fit.layout
     where = (
