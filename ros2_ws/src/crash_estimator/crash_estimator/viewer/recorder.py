@@ -26,7 +26,7 @@ SHARE = 0.2
 RUSH, HOLD = 40e6, 256e6
 """While more than RUSH bytes come in a second, drawing is put off until HOLD bytes wait: nobody can look at what goes
 by so fast. Two estimators at 20 kHz say half as much in real time, and are drawn as they speak."""
-BACK = 19
+BACK = 10
 """Niceness of the viewer meanwhile."""
 MOST = 2.0 * HOLD
 """Bytes that wait at most while others are drawn; beyond that, curves become coarser."""
