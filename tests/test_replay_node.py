@@ -1,20 +1,15 @@
 """The replay over ROS: a process of its own, as `ros2 run` starts it, and a listener here."""
 
-import os
 import re
 import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
 from crash_msgs.msg import ReplayState
 from crash_msgs.srv import Burst, Seek, SetRate, Step
 from geometry_msgs.msg import PointStamped
-from helpers_replay import Listener, Replay, environment, some_recording, wait_until
+from helpers_replay import Listener, Replay, some_recording, wait_until
 from numpy.testing import assert_array_equal
 from rcl_interfaces.srv import DescribeParameters, SetParameters
 from rclpy.parameter import Parameter
@@ -27,7 +22,6 @@ from crash_replay.qos import STREAM
 from crash_replay.recording import Recording
 from crash_replay.replay_topics import ReplayTopics
 from crash_replay.ros_messages import channel_from_msg, channel_type, stamp_ns, test_to_msg
-from crash_replay.subscribers import is_gone, running
 
 RECORDING = some_recording()  # 40 samples at 1 kHz, the impact at number 10
 FINISHED = r"finished: 40 samples sent in 40 messages, rate [\d.]+ of 1 asked for, at worst [\d.]+ ms late\n"
@@ -241,51 +235,6 @@ def test_a_subscriber_that_is_slow_loses_nothing(tmp_path):
         assert output.startswith(f"finished: {n} samples sent in {n} messages")
         wait_until(lambda: len(listener.messages) >= n)
         assert listener.numbers() == [(0, number) for number in range(n)]
-
-
-MORTAL = """
-import rclpy
-from crash_msgs.msg import Samples
-rclpy.init()
-node = rclpy.create_node("mortal")
-node.create_subscription(Samples, "samples", lambda message: None, 10)
-rclpy.spin(node)
-"""
-
-
-def test_one_that_is_killed_is_named_while_the_replay_waits_for_its_lease_to_end(bag, listener):
-    mortal = subprocess.Popen([sys.executable, "-c", MORTAL], env=environment())
-    try:
-        with Replay(bag, rate=1000, loop=True, wait_for=2, progress=False) as replay:
-            wait_until(lambda: listener.messages)
-            there = partial(listener.node.get_subscriptions_info_by_topic, "samples")
-            wait_until(lambda: "mortal" in [endpoint.node_name for endpoint in there()])
-            time.sleep(0.5)  # the replay knows it by name a little later or earlier
-            mortal.kill()
-            time.sleep(2.0)
-            status, _, errors = replay.interrupt()
-    finally:
-        mortal.kill()
-        mortal.wait()
-    said = [line for line in errors.splitlines() if "waiting for" in line]
-    assert status == 0 and len(said) == 1, errors
-    assert "what was sent is not taken: waiting for /mortal, which was killed (" in said[0]
-
-
-def test_whether_a_process_is_gone_is_known_of_this_machine_only():
-    """Participants as Fast DDS numbers them: its maker, the machine, the process, and which one in it."""
-
-    def participant(host: bytes, process: int) -> bytes:
-        return bytes([1, 15]) + host + (process & 0xFFFF).to_bytes(2, "little") + bytes(6)
-
-    here, elsewhere, own = b"ab", b"cd", os.getpid()
-    ended = subprocess.Popen([sys.executable, "-c", ""])  # not waited for: it has ended but is still listed
-    wait_until(lambda: is_gone(participant(here, ended.pid), [participant(here, own)], running()))
-    assert not is_gone(participant(elsewhere, ended.pid), [participant(here, own)], running())
-    assert not is_gone(participant(here, own), [participant(here, own)], running())
-    assert not is_gone(participant(here, ended.pid), [participant(here, own + 1)], running()), "another numbering"
-    assert not is_gone(participant(here, ended.pid), [participant(here, own)], set()), "no list of processes"
-    ended.wait()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,69 @@
+"""A subscriber that is killed while the replay waits for it."""
+
+import os
+import subprocess
+import sys
+import time
+from functools import partial
+
+import pytest
+from helpers_replay import Listener, Replay, environment, some_recording, wait_until
+
+from crash_replay.bag import write_bag
+from crash_replay.subscribers import is_gone, running
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory):
+    return write_bag(some_recording(), tmp_path_factory.mktemp("bags") / "some.mcap")
+
+
+@pytest.fixture
+def listener():
+    with Listener() as listener:
+        yield listener
+
+
+MORTAL = """
+import rclpy
+from crash_msgs.msg import Samples
+rclpy.init()
+node = rclpy.create_node("mortal")
+node.create_subscription(Samples, "samples", lambda message: None, 10)
+rclpy.spin(node)
+"""
+
+
+def test_one_that_is_killed_is_named_while_the_replay_waits_for_its_lease_to_end(bag, listener):
+    mortal = subprocess.Popen([sys.executable, "-c", MORTAL], env=environment())
+    try:
+        with Replay(bag, rate=1000, loop=True, wait_for=2, progress=False) as replay:
+            wait_until(lambda: listener.messages)
+            there = partial(listener.node.get_subscriptions_info_by_topic, "samples")
+            wait_until(lambda: "mortal" in [endpoint.node_name for endpoint in there()])
+            time.sleep(0.5)  # the replay knows it by name a little later or earlier
+            mortal.kill()
+            time.sleep(2.0)
+            status, _, errors = replay.interrupt()
+    finally:
+        mortal.kill()
+        mortal.wait()
+    said = [line for line in errors.splitlines() if "waiting for" in line]
+    assert status == 0 and len(said) == 1, errors
+    assert "what was sent is not taken: waiting for /mortal, which was killed (" in said[0]
+
+
+def test_whether_a_process_is_gone_is_known_of_this_machine_only():
+    """Participants as Fast DDS numbers them: its maker, the machine, the process, and which one in it."""
+
+    def participant(host: bytes, process: int) -> bytes:
+        return bytes([1, 15]) + host + (process & 0xFFFF).to_bytes(2, "little") + bytes(6)
+
+    here, elsewhere, own = b"ab", b"cd", os.getpid()
+    ended = subprocess.Popen([sys.executable, "-c", ""])  # not waited for: it has ended but is still listed
+    wait_until(lambda: is_gone(participant(here, ended.pid), [participant(here, own)], running()))
+    assert not is_gone(participant(elsewhere, ended.pid), [participant(here, own)], running())
+    assert not is_gone(participant(here, own), [participant(here, own)], running())
+    assert not is_gone(participant(here, ended.pid), [participant(here, own + 1)], running()), "another numbering"
+    assert not is_gone(participant(here, ended.pid), [participant(here, own)], set()), "no list of processes"
+    ended.wait()
