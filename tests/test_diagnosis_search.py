@@ -55,7 +55,8 @@ def test_an_offset_is_searched_from_where_the_forces_fit_best():
     scales = make_scales(structure, records, 36)
     (hidden,) = drawn.hidden
     addition = next(a for a in candidates(structure, scales, EFFECTS) if a.key == ("channel_offset", hidden.target))
-    starts = [one.coefficient for one in offset_starts(records, scales, fit_model(structure, records, scales, ()), addition)]
+    model = fit_model(structure, records, scales, ())
+    starts = [one.coefficient for one in offset_starts(records, scales, model, addition)]
     assert len(starts) == OFFSET_STARTS
     step = (addition.effect.high - addition.effect.low) / OFFSETS
     assert abs(starts[0] - hidden.coefficient) < step

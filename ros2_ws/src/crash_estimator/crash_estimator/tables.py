@@ -9,7 +9,13 @@ from .core.errors import EquationError
 from .core.estimate import Description, Estimate, ParameterStatus
 from .core.structure import EffectSpec
 
-READABLE = {"N/m": ("kN/m", 1e-3), "N*s/m": ("N s/m", 1.0), "m/s^2": ("g", 1.0 / 9.80665), "N": ("kN", 1e-3), "kg": ("kg", 1.0)}
+READABLE = {
+    "N/m": ("kN/m", 1e-3),
+    "N*s/m": ("N s/m", 1.0),
+    "m/s^2": ("g", 1.0 / 9.80665),
+    "N": ("kN", 1e-3),
+    "kg": ("kg", 1.0),
+}
 """SI unit -> the unit shown and the factor to it."""
 
 OF_ELEMENTS = ("N/m", "N*s/m", "kg")
@@ -21,7 +27,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [list(head), *[list(row) for row in rows]]
     widths = [max(len(line[k]) for line in lines) for k in range(len(head))]
     aligned = [
-        "  ".join(cell.ljust(width) if k == 0 else cell.rjust(width) for k, (cell, width) in enumerate(zip(line, widths)))
+        "  ".join(cell.rjust(width) if k else cell.ljust(width) for k, (cell, width) in enumerate(zip(line, widths)))
         for line in lines
     ]
     return "\n".join(line.rstrip() for line in (aligned[0], "-" * len(aligned[0]), *aligned[1:]))

@@ -7,7 +7,7 @@ import numpy as np
 
 from .fit import Fit, advance
 from .layout import Layout
-from .linearise import linearise, output_noise, predicted
+from .linearise import Equations, linearise, output_noise, predicted
 from .linkforce import LinkForce
 from .motion import motion_of
 from .normal import may_diverge, whitened
@@ -50,23 +50,23 @@ def noise_floor(layout: Layout, records: Sequence[Record]) -> float:
     return rms(layout, [np.where(np.isfinite(r.measured), r.noise, np.nan) for r in records])
 
 
+@may_diverge
 def assess(fitted: Fit, records: Sequence[Record], sharply: bool = False) -> Left:
     """What a fit leaves; sharply: white is only what looks so also beside what the fit must have absorbed.
 
     That shows where a curve has not yet been let fold (`curves.adapted_roughness`), too: it is for finished models.
     """
-    left = _left(fitted.layout, records, fitted.theta, fitted.trajectories)
+    equations = _equations(fitted.layout, records, fitted.theta, fitted.trajectories)
+    left = _left(fitted.layout, records, fitted.theta, equations)
     if not sharply or not left.whiteness.white or records[0].mix is not None:
         return left
-    absorbed = [_absorbed(fitted, record, r) for r, record in enumerate(records)]
+    absorbed = [_absorbed(fitted, record, r, equations[r]) for r, record in enumerate(records)]
     sharper = whiteness_of_fit(absorbed, [record.noise_samples for record in records])
     return left if sharper.white else left._replace(whiteness=sharper)
 
 
-@may_diverge
-def _absorbed(fitted: Fit, record: Record, r: int) -> list[Absorbed]:
+def _absorbed(fitted: Fit, record: Record, r: int, equations: Equations) -> list[Absorbed]:
     """One for each output."""
-    equations = linearise(fitted.layout, record, r, fitted.theta, fitted.trajectories[r])
     residual, jacobian = whitened(fitted.layout, record, r, fitted.theta, fitted.trajectories[r], equations)
     columns = equations.columns
     covariance = fitted.covariance[np.ix_(columns, columns)]
@@ -77,23 +77,29 @@ def _absorbed(fitted: Fit, record: Record, r: int) -> list[Absorbed]:
     return [Absorbed(residual[:, q], roots[:, q], period) for q in range(residual.shape[1])]
 
 
-@may_diverge
-def _left(layout: Layout, records: Sequence[Record], theta: np.ndarray, trajectories: Sequence[Trajectory]) -> Left:
-    outputs, residuals, links = [], [], []
-    for r, (record, trajectory) in enumerate(zip(records, trajectories)):
-        equations = linearise(layout, record, r, theta, trajectory)
-        output = predicted(layout, record, r, theta, equations.rows)[0][record.at]
+def _equations(
+    layout: Layout, records: Sequence[Record], theta: np.ndarray, trajectories: Sequence[Trajectory]
+) -> list[Equations]:
+    along = enumerate(zip(records, trajectories))
+    return [linearise(layout, record, r, theta, trajectory) for r, (record, trajectory) in along]
+
+
+def _left(layout: Layout, records: Sequence[Record], theta: np.ndarray, equations: Sequence[Equations]) -> Left:
+    outputs, residuals = [], []
+    for r, (record, each) in enumerate(zip(records, equations)):
+        output = predicted(layout, record, r, theta, each.rows)[0][record.at]
         outputs.append(output)
         residuals.append(np.where(record.valid[record.at] > 0.0, record.measured - output, np.nan))
-        links.append(equations.links)
+    links = tuple(each.links for each in equations)
     noise = tuple(output_noise(layout, record, theta).std for record in records)
     scaled = [residual / std for residual, std in zip(residuals, noise)]
     periods = [record.period for record in records]
     white = whiteness(scaled, [record.noise_samples for record in records], periods)
     cost = float(np.nanmean(np.concatenate([z.ravel() for z in scaled]) ** 2))
-    return Left(tuple(outputs), tuple(residuals), noise, tuple(links), white, rms(layout, residuals), cost)
+    return Left(tuple(outputs), tuple(residuals), noise, links, white, rms(layout, residuals), cost)
 
 
+@may_diverge
 def free_run(fitted: Fit, records: Sequence[Record]) -> Left:
     """Simulation from the initial motion alone: nothing about this recording's sensors is fitted."""
     layout = fitted.layout
@@ -108,4 +114,4 @@ def free_run(fitted: Fit, records: Sequence[Record]) -> Left:
             if np.abs(moved.a - last.a).max() < SIMULATED * np.abs(moved.a).max():
                 break
         trajectories.append(moved)
-    return _left(layout, records, theta, trajectories)
+    return _left(layout, records, theta, _equations(layout, records, theta, trajectories))

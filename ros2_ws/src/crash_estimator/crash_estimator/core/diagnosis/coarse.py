@@ -5,7 +5,7 @@ A mean over a bin is a sample with less noise, at the bin's centre; what is fast
 
 import numpy as np
 
-from .records import Record, Signal
+from .records import Record, Signal, cosines_of
 
 STEP = 5e-4
 """s: the linear-acceleration step's phase error, (omega dt)^2 / 24, is 4e-4 for the stiffest contact, 200 rad/s."""
@@ -41,6 +41,7 @@ def coarsened(record: Record) -> Record:
         bin=bin_,
         valid=np.concatenate([np.zeros((1, mean.shape[1])), np.sqrt(count / per_bin)]),
         bins=bins,
+        cosines=cosines_of(grid),
     )
 
 

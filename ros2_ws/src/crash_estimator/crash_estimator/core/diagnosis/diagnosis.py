@@ -137,7 +137,8 @@ def _text(verdict: str, steps, ranking, first: Model, final: Model, floor: float
         why = f"; small, yet noise would not leave it ({steps[0].evidence:.0f} nats of evidence)" if small else ""
         return f"effect missing: {names}; {size}, now white{why}{advice}"
     if final.left.whiteness.white:
-        return f"unexplained: {names} together leave only noise; {size}; one effect of another kind is likelier than so many"
+        why = "one effect of another kind is likelier than so many"
+        return f"unexplained: {names} together leave only noise; {size}; {why}"
     worst = final.left.whiteness.worst
     layout = final.fit.layout
     where = (

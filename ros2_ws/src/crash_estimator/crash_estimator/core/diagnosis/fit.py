@@ -123,14 +123,15 @@ def advance(
 ) -> Trajectory:
     """The trajectory of theta + delta, to first order."""
     linear = equations.linear
-    change = delta[equations.columns]
-    extra = linear.extra[:, :, :1] + (linear.extra[:, :, 1:] @ change[layout.knots :])[:, :, None]
-    knots = np.concatenate([[0.0], delta[: layout.knots]])
-    push = (linear.weight * np.where(linear.knot >= 0, knots[linear.knot], 0.0)).sum(axis=2)  # (g, l)
+    change = np.append(1.0, delta[equations.columns])[linear.column]
+    bodies = np.arange(len(layout.bodies))
+    acts = np.where(linear.body == bodies[:, None], change, 0.0) @ linear.acts  # (b, g)
+    push = (linear.weight * np.where(linear.knot >= 0, delta[linear.knot], 0.0)).sum(axis=2)  # (g, l)
     for i, (a, c) in enumerate(linear.ends):
-        extra[:, a, 0] -= push[:, i] * linear.inverse_mass[a]
-        extra[:, c, 0] += push[:, i] * linear.inverse_mass[c]
-    single = linear._replace(extra=extra, knot=np.full_like(linear.knot, -1))
+        acts[a] -= push[:, i] * linear.inverse_mass[a]
+        acts[c] += push[:, i] * linear.inverse_mass[c]
+    knot = np.full_like(linear.knot, -1)
+    single = linear._replace(others=1, column=np.zeros_like(bodies), body=bodies, acts=acts, knot=knot)
     trace = np.zeros((len(record.time), len(layout.bodies)))
     propagate(single, 0, equations.sampling, np.zeros((record.bins, len(layout.outputs), 1)), trace)
     return motion_of(layout, record, r, theta + delta, trajectory.a + trace)
@@ -143,7 +144,8 @@ def equation_error_start(layout: Layout, records: Sequence[Record]) -> tuple[np.
 
 
 def equation_error(layout: Layout, records: Sequence[Record], inflate: float = 30.0) -> float:
-    """What that fit leaves, in noise taken larger, for the motion's own errors weigh more; effects stay as they start."""
+    """What that fit leaves, in noise taken larger, for the motion's own errors weigh more; effects stay as they
+    start."""
     try:
         return _along_the_measured(layout, records, inflate, [p.coefficient for p in layout.places])[2].after
     except LinAlgError:

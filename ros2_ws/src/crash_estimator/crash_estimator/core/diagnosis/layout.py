@@ -15,12 +15,9 @@ from ..structure import Coefficient, Structure
 from .builder import Builder, Prior
 from .curves import ROUGHNESS, Curve, make_knots
 from .propagate import DRIVEN, FIXED, FREE
-from .records import Record, outputs_of
+from .records import DRIVEN_MODES, Record, outputs_of
 from .pairs import pair_of
 from .scales import Scales
-
-DRIVEN_MODES = 6
-"""Cosines of a driven channel's noise beside its mean: integrated twice, what is faster moves nothing."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from ..effects.base import AttachedBody, BodyForce, BodyInertia
 from .layout import Layout, Link, Place
 from .linkforce import LinkForce, link_force
 from .motion import distortion, driven_motion, measured_motion
-from .propagate import DRIVEN, FIXED, FREE, Linear, Sampling
+from .propagate import DRIVEN, FREE, Linear, Sampling
 from .records import Record
 from .temper import CFC, SLOWEST
 from .trajectory import Trajectory, measured_crush
@@ -43,17 +43,22 @@ def linearise(
     measured = np.array([_measured(layout, body) for body in range(bodies)], dtype=float)
     inverse = np.where(layout.kind == FREE, 1.0 / mass, measured)
     inverse[layout.kind == DRIVEN] = 0.0
-    external: dict[int, np.ndarray] = {}
+    driven = layout.kind == DRIVEN
+    columns: dict[int, int] = {}  # by parameter
+    acting: list[tuple[int, int, np.ndarray]] = []
 
-    def external_for(parameter: int) -> np.ndarray:
-        if parameter not in external:
-            external[parameter] = np.zeros((g, bodies))
-        return external[parameter]
+    def act(parameter: int, body: int, values: np.ndarray) -> None:
+        acting.append((columns.setdefault(parameter, 1 + len(columns)), body, values))
+
+    def push(parameter: int, ends: tuple[int, int], force: np.ndarray) -> None:
+        for k, sign in zip(ends, (-1.0, 1.0)):
+            if inverse[k]:
+                act(parameter, k, sign * inverse[k] * force)
 
     loads = np.zeros((g, bodies))
     n = len(layout.links)
     kx, kv, kp = np.zeros((g, n)), np.zeros((g, n)), np.zeros((g, n))
-    loading, knot, weight = np.zeros((g, n), bool), np.full((g, n, 2), -1, np.int64), np.zeros((g, n, 2))
+    loading, knot, weight = np.zeros((g, n), bool), np.zeros((g, n, 2), np.int64), np.zeros((g, n, 2))
     forces = []
     for i, link in enumerate(layout.links):
         crush, rate = _motion(link, record, r, trajectory)
@@ -61,58 +66,52 @@ def linearise(
         a, c = link.ends
         loads[:, a] -= found.force
         loads[:, c] += found.force
-        kx[:, i], kv[:, i], kp[:, i], loading[:, i] = found.kx, found.kv, found.kp, found.loading
-        knot[:, i], weight[:, i] = np.where(found.knot >= 0, found.knot + 1, -1), found.weight
+        kx[:, i], kv[:, i], kp[:, i] = found.kx, found.kv, found.kp
+        loading[:, i] = found.loading & found.kp.any()  # no peak is kept that nothing hangs on
+        knot[:, i], weight[:, i] = found.knot, found.weight
         for parameter, column in zip(found.parameters, found.columns):
-            into = external_for(parameter)
-            into[:, a] -= column * inverse[a]
-            into[:, c] += column * inverse[c]
+            push(parameter, link.ends, column)
         forces.append(found)
     numbers = {link.name: i for i, link in enumerate(layout.links)}
     for j, link in enumerate(switched):
-        present, (a, c) = forces[numbers[link.name]], link.ends
+        present = forces[numbers[link.name]]
         crush, rate = _motion(link, record, r, trajectory)
         tried = np.append(theta, link.trial)
         other = link_force(_acting(link, theta), tried, record.time, blur * _steps(record), crush, rate)
-        change = other.force - present.force
-        into = external_for(layout.size + j)
-        into[:, a] -= change * inverse[a]
-        into[:, c] += change * inverse[c]
+        push(layout.size + j, link.ends, other.force - present.force)
     for place in layout.places:
-        _body_effect(layout, record, place, theta, trajectory, loads, external_for, inverse)
+        _body_effect(layout, record, place, theta, trajectory, loads, act, inverse)
     rows = loads * inverse
-    driven = layout.kind == DRIVEN
     rows[:, driven] = trajectory.a[:, driven]
     for place in layout.places:
         addition = place.addition
         inertia = addition.target if isinstance(addition.effect, BodyInertia) else None
         if inertia is not None:
             k = layout.structure.body_index[inertia]
-            external_for(place.coefficient)[:, k] -= rows[:, k] * inverse[k]
+            act(place.coefficient, k, -inverse[k] * rows[:, k])
         if isinstance(addition.effect, AttachedBody) and addition.taken_from:
             k = layout.structure.body_index[addition.taken_from]
-            external_for(place.coefficient)[:, k] += rows[:, k] * inverse[k]
+            act(place.coefficient, k, inverse[k] * rows[:, k])
     for k, parameter, column in driven_motion(layout, record, r, theta)[1]:
-        external_for(parameter)[:, k] += column
+        act(parameter, k, column)
     sampling, outputs = _sampling(layout, record, theta)
-    for parameter in outputs:
-        external_for(parameter)
-    for q in range(len(layout.outputs)):
-        external_for(layout.offsets[r] + q)
-    extra = np.zeros((g, bodies, 1 + len(external)))
+    for parameter in [*outputs, *(layout.offsets[r] + q for q in range(len(layout.outputs)))]:
+        columns.setdefault(parameter, 1 + len(columns))
+    defect = rows.copy()
     free = layout.kind == FREE
-    extra[:, free, 0] = rows[:, free] - trajectory.a[:, free]
+    defect[:, free] -= trajectory.a[:, free]
     if pull:
         x, v = trajectory.x - target.x, trajectory.v - target.v
-        extra[:, free, 0] -= pull**2 * x[:, free] + 2.0 * pull * v[:, free]
-    fixed = layout.kind == FIXED
-    extra[:, fixed, 0] = rows[:, fixed]
-    for j, column in enumerate(external.values()):
-        extra[:, :, j + 1] = column
+        defect[:, free] -= pull**2 * x[:, free] + 2.0 * pull * v[:, free]
+    acting += [(0, int(k), defect[:, k]) for k in np.flatnonzero(~driven)]
     ends = np.array([link.ends for link in layout.links]).reshape(-1, 2)
     crush_ends = np.array([link.crush_ends for link in layout.links]).reshape(-1, 2)
-    linear = Linear(record.dt, ends, crush_ends, inverse, layout.kind, kx, kv, kp, loading, knot, weight, pull, extra)
-    every = np.concatenate([np.arange(layout.knots), np.array(list(external), dtype=int)])
+    column, body, acts = (np.array(each) for each in zip(*acting))
+    linear = Linear(
+        record.dt, ends, crush_ends, inverse, layout.kind, kx, kv, kp, loading, knot, weight, pull,
+        1 + len(columns), column, body, acts,
+    )  # fmt: skip
+    every = np.concatenate([np.array(list(columns), dtype=int), np.arange(layout.knots)])
     return Equations(linear, sampling, rows, every, forces)
 
 
@@ -150,7 +149,7 @@ def _motion(link, record: Record, r: int, trajectory: Trajectory) -> tuple[np.nd
     return trajectory.x[:, a] - trajectory.x[:, b] - origin, trajectory.v[:, a] - trajectory.v[:, b]
 
 
-def _body_effect(layout, record, place: Place, theta, trajectory, loads, external_for, inverse) -> None:
+def _body_effect(layout, record, place: Place, theta, trajectory, loads, act, inverse) -> None:
     """Forces that act on one body: constant ones, and an attached body's inertia."""
     addition, c = place.addition, float(theta[place.coefficient])
     if isinstance(addition.effect, BodyForce):
@@ -161,7 +160,7 @@ def _body_effect(layout, record, place: Place, theta, trajectory, loads, externa
     else:
         return
     loads[:, k] += c * force
-    external_for(place.coefficient)[:, k] += force * inverse[k]
+    act(place.coefficient, k, inverse[k] * force)
 
 
 def _rigid(record: Record, a: np.ndarray) -> np.ndarray:

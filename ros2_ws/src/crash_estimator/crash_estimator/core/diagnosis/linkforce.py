@@ -54,10 +54,10 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
         k = theta[link.constant] if link.constant is not None else link.known_stiffness
         static, stiffness = k * at, np.full_like(at, k)
         knot, weight = np.full((len(x), 2), -1), np.zeros((len(x), 2))
-    kx, kp = np.where(on_line, 0.0, stiffness), np.where(on_line, stiffness, 0.0)
+    kx, kp = stiffness, np.zeros_like(at)
     if slope is not None:
         static = static - np.where(on_line, slope * (peak - x), 0.0)
-        kx, kp = np.where(on_line, slope, kx), np.where(on_line, kp - slope, kp)
+        kx, kp = np.where(on_line, slope, stiffness), np.where(on_line, stiffness - slope, 0.0)
     gate, gate_slope, open_ = _gate(link, x, rate, dt, static, on_line, slope)
     spring_weight, spring_kp = weight, kp
     static, kx, kp = static * open_, kx * open_, kp * open_
@@ -69,40 +69,45 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
         parameters.append(link.slope)
         columns.append(np.where(on_line, x - peak, 0.0) * open_)
 
-    factor, kv = np.ones_like(x), np.zeros_like(x)
-    for place in link.factors:
-        c, h, dh = _factor(place, theta, rate, dt)
-        factor = factor + c * h[0]
-        kv = kv + static * c * dh
-        parameters += [place.coefficient, *place.shapes.values()]
-        columns += [static * h[0], *(static * c * d for d in h[1:])]
-    force, kx, kp, weight = static * factor, kx * factor, kp * factor, weight * factor[:, None]
-    columns = [
-        column * factor if p in (link.constant, link.slope) else column for p, column in zip(parameters, columns)
-    ]
+    kv, force = np.zeros_like(x), static
+    if link.factors:
+        factor = np.ones_like(x)
+        for place in link.factors:
+            c, h, dh = _factor(place, theta, rate, dt)
+            factor = factor + c * h[0]
+            kv = kv + static * c * dh
+            parameters += [place.coefficient, *place.shapes.values()]
+            columns += [static * h[0], *(static * c * d for d in h[1:])]
+        force, kx, kp, weight = static * factor, kx * factor, kp * factor, weight * factor[:, None]
+        columns = [
+            column * factor if p in (link.constant, link.slope) else column for p, column in zip(parameters, columns)
+        ]
 
-    parallel, px, pv = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
     damping = theta[link.damping] if link.damping is not None else link.known_damping
-    if damping or link.damping is not None:
-        parallel, pv = parallel + damping * rate, pv + damping
+    if damping or link.damping is not None or link.forces:
+        parallel, px, pv = damping * rate, np.zeros_like(x), np.full_like(x, damping)
         if link.damping is not None:
             parameters.append(link.damping)
             columns.append(gate * rate)
-    if link.forces:
         motion = ElementMotion(time, x, rate, peak, static)
         for place in link.forces:
             c = theta[place.coefficient]
-            f, fx, fv, by_shape = _force(place, theta, motion, dt)
+            f = place.addition.effect.force(motion, **_shapes(place, theta))
+            parameters.append(place.coefficient)
+            columns.append(gate * f)
+            if not c:  # nothing that a slope or a shape constant would change
+                continue
+            fx, fv, by_shape = _slopes(place, theta, motion)
             parallel, px, pv = parallel + c * f, px + c * fx, pv + c * fv
-            parameters += [place.coefficient, *place.shapes.values()]
-            columns += [gate * f, *(gate * c * d for d in by_shape)]
-    force = force + gate * parallel
-    kx, kv = kx + gate * px + gate_slope * parallel, kv + gate * pv
-    if slope is not None:
-        # on the unloading line it is the spring's force that opens the contact: what changes it, moves the instant
-        opens = np.where(on_line, gate_slope * parallel / max(slope, 1.0), 0.0)
-        weight, kp = weight + opens[:, None] * spring_weight, kp + opens * spring_kp
-        columns = [c + opens * at if p == link.constant else c for p, c in zip(parameters, columns)]
+            parameters += place.shapes.values()
+            columns += [gate * c * d for d in by_shape]
+        force = force + gate * parallel
+        kx, kv = kx + gate * px + gate_slope * parallel, kv + gate * pv
+        if slope is not None:
+            # on the unloading line it is the spring's force that opens the contact: what changes it, moves the instant
+            opens = np.where(on_line, gate_slope * parallel / max(slope, 1.0), 0.0)
+            weight, kp = weight + opens[:, None] * spring_weight, kp + opens * spring_kp
+            columns = [c + opens * at if p == link.constant else c for p, c in zip(parameters, columns)]
     if link.gap is not None:
         parameters.append(link.gap)
         columns.append(-np.where(on_line, kx + kp, kx))
@@ -136,10 +141,9 @@ def _shapes(place: Place, theta: np.ndarray, changed: str = "", by: float = 0.0)
 LOG_STEP = 1e-4
 
 
-def _force(place: Place, theta, motion: ElementMotion, dt):
-    """f, its slopes by crush and rate, and its derivatives by the logarithm of each shape constant."""
+def _slopes(place: Place, theta, motion: ElementMotion):
+    """Of an effect's force, by crush and rate, and its derivatives by the logarithm of each shape constant."""
     effect, shapes = place.addition.effect, _shapes(place, theta)
-    f = effect.force(motion, **shapes)
 
     def shifted(sign):
         crush = motion.crush + sign * SMALL_CRUSH
@@ -158,7 +162,7 @@ def _force(place: Place, theta, motion: ElementMotion, dt):
         / (2.0 * LOG_STEP)
         for name in place.shapes
     ]
-    return f, fx, fv, by_shape
+    return fx, fv, by_shape
 
 
 def _factor(place: Place, theta, rate, dt):

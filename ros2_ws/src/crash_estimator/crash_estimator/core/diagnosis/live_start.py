@@ -10,10 +10,10 @@ import numpy as np
 
 from .curves import value
 from .fit import Fit
-from .layout import DRIVEN_MODES, Layout
+from .layout import Layout
 from .motion import measured_motion, motion_of
 from .propagate import FREE
-from .records import Record
+from .records import DRIVEN_MODES, Record
 from .trajectory import Trajectory
 
 

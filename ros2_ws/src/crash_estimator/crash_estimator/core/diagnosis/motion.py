@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects.base import AttachedBody, ChannelError
-from .layout import DRIVEN_MODES, Layout
+from .layout import Layout
 from .propagate import FREE
-from .records import Record
+from .records import DRIVEN_MODES, Record
 from .scales import attached_start
 from .trajectory import Trajectory, integrate
 
@@ -38,8 +38,6 @@ def driven_motion(layout: Layout, record: Record, r: int, theta: np.ndarray):
     a, by = np.zeros((g, len(layout.bodies))), []
     channels = {k: body.acceleration for k, body in enumerate(structure.bodies) if body.driven}
     channels |= {k: (channel,) for channel, k in layout.attached.items()}
-    end = record.time[-1]
-    cosines = np.cos(np.outer(np.pi * record.time / end, np.arange(DRIVEN_MODES + 1)))
     for k, names in channels.items():
         for name in names:
             d, signal = distortion(layout, theta, name), record.signals[name]
@@ -57,8 +55,8 @@ def driven_motion(layout: Layout, record: Record, r: int, theta: np.ndarray):
                 up, down = (np.interp(after + s * step, signal.time, signal.values) for s in (1.0, -1.0))
                 by.append((k, delay, share * (up - down) / (2.0 * step) / (1.0 + d.gain)))
         first = layout.modes[r][k]
-        a[:, k] += cosines @ theta[first : first + DRIVEN_MODES + 1]
-        by += [(k, first + j, cosines[:, j]) for j in range(DRIVEN_MODES + 1)]
+        a[:, k] += record.cosines @ theta[first : first + DRIVEN_MODES + 1]
+        by += [(k, first + j, record.cosines[:, j]) for j in range(DRIVEN_MODES + 1)]
     return a, by
 
 

@@ -23,6 +23,9 @@ BIN = 4e-4
 
 FEWEST_SAMPLES = 20
 
+DRIVEN_MODES = 6
+"""Cosines of a driven channel's noise beside its mean: integrated twice, what is faster moves nothing."""
+
 
 class Signal(NamedTuple):
     """One channel, zero offset removed, NaN bridged, from before the impact to the end."""
@@ -61,6 +64,7 @@ class Record(NamedTuple):
     bin: np.ndarray  # (g,) bin of the sample at that instant, -1 where none
     valid: np.ndarray  # (g, q) 1 where a sample is valid, divided by the root of the valid samples in its bin
     bins: int
+    cosines: np.ndarray  # (g, 1 + DRIVEN_MODES), the mean first
     mix: np.ndarray | None = None  # (q, q) whitens outputs that are in units of their noise; None: they are independent
 
     @property
@@ -112,7 +116,13 @@ def make_record(structure: Structure, recording: Recording) -> Record:
         bin=bin_,
         valid=valid,
         bins=bins,
+        cosines=cosines_of(time),
     )
+
+
+def cosines_of(time: np.ndarray) -> np.ndarray:
+    """`cosines` of a Record on a grid of instants."""
+    return np.cos(np.outer(np.pi * time / time[-1], np.arange(DRIVEN_MODES + 1)))
 
 
 def _grid(sample_time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

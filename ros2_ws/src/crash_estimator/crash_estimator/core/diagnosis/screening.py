@@ -20,10 +20,10 @@ from scipy.special import log_ndtr
 
 from ..effects.base import Gap, UnloadingSlope
 from .fit import Fit, equation_error_start, solve
-from .layout import DRIVEN_MODES, Addition, Layout, Link, make_layout
+from .layout import Addition, Layout, Link, make_layout
 from .motion import motion_of
 from .normal import normal_equations
-from .records import Record
+from .records import DRIVEN_MODES, Record
 from .scales import Scales
 
 

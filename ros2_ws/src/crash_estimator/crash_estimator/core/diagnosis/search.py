@@ -34,7 +34,8 @@ MOST_LEFT = 100.0
 """Mean square in units of the noise that the first one leaves: of a real structure no second one takes that."""
 
 PAIR_GAIN = 100.0
-"""Nats that each of two must gain that are found at once: there are thousands of pairs, and some mimic anything small."""
+"""Nats that each of two must gain that are found at once: there are thousands of pairs, and some mimic anything
+small."""
 
 LEAST_SHARE = 0.15
 """Of what the model before it leaves above the floor: an addition that removes less of it, and still leaves more than
@@ -83,9 +84,10 @@ def _one_by_one(
             model, rounds = fair, rounds[:-1]
             continue
         scales, larger = _with(records, scales, model, done.best)
-        removed = max(share_removed(done.before.left, left) for left in (larger.left, assess(done.best.fit, records)))
-        if not larger.left.whiteness.white and removed < LEAST_SHARE:
-            return rounds, done.before
+        if not larger.left.whiteness.white:
+            after = larger.left, assess(done.best.fit, records)
+            if max(share_removed(done.before.left, left) for left in after) < LEAST_SHARE:
+                return rounds, done.before
         model = larger
 
 
@@ -100,7 +102,7 @@ def _with(records: Sequence[Record], scales: Scales, model: Model, best: Tried) 
 def two_at_once(
     records: Sequence[Record], scales: Scales, effects: Mapping[str, Effect], model: Model, tried: Sequence[Tried]
 ):
-    """Where no effect counts for itself in noise as large as what it leaves: two that leave the sensors' noise together.
+    """Where no effect counts for itself in noise as large as what it leaves: two that leave only the sensors'.
 
     The likeliest first ones, as recorded, each with the best second one -> what `_one_by_one` goes on from, or None.
     """

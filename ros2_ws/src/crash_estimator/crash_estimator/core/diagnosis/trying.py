@@ -73,12 +73,11 @@ def try_candidates(
     search.from_model(shortlist(worth, SHORTLIST))
     if thorough and not model.left.whiteness.white:
         offsets = [a for a in additions if isinstance(a.effect, ChannelError) and a.effect.role == "offset"]
-        shifted = [start for a in offsets for start in offset_starts(records, scales, model, a)]
         for harder in (
             search.slowly,
             lambda: search.from_model(shortlist(by_motion, SHORTLIST) + shortlist(worth, LONG_LIST)),
             lambda: search.from_motion(shortlist(worth, SHORTLIST) + shortlist(by_motion, LONG_LIST)),
-            lambda: search.from_motion([Screened(a, 0.0, a.coefficient, 1.0) for a in shifted]),
+            lambda: search.from_motion([start for a in offsets for start in offset_starts(records, scales, model, a)]),
             search.slowly,
             lambda: search.from_motion(shortlist(by_motion, SHORTLIST) + shortlist(worth, SHORTLIST), HOTTER),
         ):
@@ -181,7 +180,7 @@ class _Search:
         return fitted + [t._replace(gain=min(t.gain, least)) for t in rest]
 
 
-def offset_starts(records: Sequence[Record], scales: Scales, model: Model, addition: Addition) -> list[Addition]:
+def offset_starts(records: Sequence[Record], scales: Scales, model: Model, addition: Addition) -> list[Screened]:
     """The offset at the values with which the forces along the measured motion fit best."""
     low, high = addition.effect.low, addition.effect.high
     step = (high - low) / OFFSETS
@@ -191,7 +190,7 @@ def offset_starts(records: Sequence[Record], scales: Scales, model: Model, addit
         layout = make_layout(scales.structure, records, scales, [*model.additions, one], model.roughness)
         return equation_error(layout, records)
 
-    return sorted(shifted, key=misfit)[:OFFSET_STARTS]
+    return [Screened(one, 0.0, one.coefficient, 1.0) for one in sorted(shifted, key=misfit)[:OFFSET_STARTS]]
 
 
 def _handicap(addition: Addition) -> float:
