@@ -114,7 +114,8 @@ def test_no_samples(tmp_path):
 def test_not_a_bag(tmp_path):
     assert error(tmp_path / "nothing").startswith("there is no such bag")
     (tmp_path / "text.mcap").write_text("time,rib_ay\n")
-    assert error(tmp_path / "text.mcap") == "not an MCAP file"
+    said = error(tmp_path / "text.mcap")
+    assert said.startswith("not an MCAP file; `import SOURCE --to NEW.mcap` makes a bag of a CSV with its YAML")
     (tmp_path / "folder").mkdir()
     assert error(tmp_path / "folder").startswith("no .mcap file in it; expected a rosbag2 folder")
     (tmp_path / "folder/x.db3").touch()

@@ -12,7 +12,7 @@ from crash_replay.bag import read_bag, write_bag
 from crash_replay.conditioning import cfc_filter
 from crash_replay.import_command import main
 from crash_replay.recording import Channel, Recording, Test
-from crash_replay.sensor_checks import doubtful_channels
+from crash_replay.sensor_checks import doubtful_channels, gaps_in_time
 
 T = np.arange(-500, 1500) * 1e-4  # s
 
@@ -161,6 +161,28 @@ def test_faulty_channels_are_named():
     )
     stuck = np.where(T > 0.03, (PULSE + NOISE)[np.searchsorted(T, 0.03)], PULSE + NOISE)
     assert len(doubts(stuck)) == 1 and "from 0.03" in doubts(stuck)[0] and doubts(stuck)[0].endswith("stuck?")
+
+
+def test_values_missing_in_between_are_named():
+    """A channel may begin late or end early; a hole in it, and a hole in all of them, is worth a line."""
+    hole = np.where((T > 0.02) & (T < 0.0205), np.nan, PULSE + NOISE)
+    assert doubts(hole) == ["c: 4 samples without a value, 0.0201 to 0.0204 s"]
+    recording = Recording(Test("T", (Channel("c", "force"),)), np.rint(T * 1e9).astype(np.int64), hole[:, None])
+    assert gaps_in_time(recording) == []
+    there = np.isfinite(hole)
+    assert gaps_in_time(Recording(recording.test, recording.time_ns[there], recording.values[there])) == [
+        "time: a gap of 0.5 ms after 0.0200 s"
+    ]
+    there[900:1000] = False
+    assert gaps_in_time(Recording(recording.test, recording.time_ns[there], recording.values[there])) == [
+        "time: 2 gaps, the longest of 10.1 ms after 0.0399 s"
+    ]
+
+
+def test_missing_initial_velocity_is_said(source, tmp_path, capsys):
+    source.with_suffix(".yaml").write_text("channels: {car_ax: {quantity: acceleration, unit: g, body: car}}\n")
+    assert run(source, "--to", tmp_path / "b") == 0
+    assert "initial velocity not given: every body is at rest until the impact" in capsys.readouterr().out
 
 
 def test_a_doubt_travels_with_the_bag(tmp_path, capsys):

@@ -103,6 +103,15 @@ def test_time_is_rounded_to_ns(steps):
         assert_array_equal(read_source(path).time_ns, times)
 
 
+def test_time_in_ms_is_refused(tmp_path):
+    """130 ms at 10 kHz, their time written in ms: read as s, they would be a crash of two minutes."""
+    rows = [f"{k * 0.1 - 30.0:.1f},1,2,3,4" for k in range(1301)]
+    path = write(tmp_path, "time,rib_ay,barrier_fx,nose_travel,spare\n" + "\n".join(rows))
+    assert error(path) == (
+        "t.csv: time runs from -30 to 100 s with a sample every 0.1 s, which is no crash: it must be in s; is it in ms?"
+    )
+
+
 def test_id_is_the_file_name_where_none_is_given_and_numbers_are_names(tmp_path):
     path = write(tmp_path, description="channels: {rib_ay: {quantity: acceleration, unit: g}}\n")
     assert read_source(path).test.id == "t"

@@ -2,12 +2,18 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from crash_estimator.cli import report, simulate
+from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.structure import EffectSpec
+from crash_estimator.model_file import load_model
+from crash_estimator.report_page import _estimated
+from crash_replay.bag import read_bag
 
 BAGS = Path(__file__).parents[1] / "bags"
 
@@ -70,6 +76,16 @@ def test_a_report_is_a_page_with_its_figures(monkeypatch, capsys, tmp_path):
     assert named <= {path.name for path in tmp_path.iterdir()} and len(named) >= 5
     for name in named:
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_load_path_of_the_model_is_one_more_element():
+    """It acts in the equations of its two bodies and in no other."""
+    model = load_model("side_mdb_door_car")
+    model = replace(model, effects=(EffectSpec("load_path", "mdb-car", 1e4),))
+    recording = read_bag(BAGS / "side_mdb_door_car.mcap")
+    found = _estimated(recording, model, "rls", np.inf, {}, EFFECTS).validation
+    told = {e.equation: {name.split(".")[0] for name in e.cross} for e in found.equations}
+    assert told["door"] == {"mdb_door", "door_car"} and told["car"] == {"door_car", "mdb-car"}
 
 
 def test_figures_are_the_same_bytes_again(tmp_path):

@@ -70,7 +70,8 @@ def _estimated(
 ) -> Result:  # fmt: skip
     estimator = make_estimator(structure, recording.test, method, effects=effects, **settings)
     estimates = run(estimator, (sample for sample in recording.samples() if sample.time <= end))
-    return Result(estimator.description, estimates, validate(structure, estimator.description, estimates))
+    whole = applied(structure, recording.test, effects)  # a load path of its effects is one more element
+    return Result(estimator.description, estimates, validate(whole, estimator.description, estimates))
 
 
 def _test(recording: Recording, structure: Structure, end: float) -> list[str]:

@@ -11,6 +11,7 @@ from mcap.stream_reader import StreamReader
 from .recording import RecordingError
 
 MAGIC = b"\x89MCAP0\r\n"
+IMPORT = "`import SOURCE --to NEW.mcap` makes a bag of a CSV with its YAML, an EV5 or an ISO-MME folder"
 
 
 @dataclass
@@ -29,7 +30,7 @@ def bag_files(path: Path) -> list[Path]:
         raise RecordingError(f"{path}: there is no such bag; give a rosbag2 folder or an .mcap file")
     files = sorted(path.glob("*.mcap"), key=lambda file: (len(file.name), file.name))  # ..._9.mcap before ..._10.mcap
     if not files:
-        hint = "expected a rosbag2 folder with an .mcap file"
+        hint = f"expected a rosbag2 folder with an .mcap file; {IMPORT}"
         if any(path.glob("*.db3")):
             hint = f"it is an SQLite bag: `rosbags-convert --src {path} --dst NEW --dst-storage mcap` makes it MCAP"
         raise RecordingError(f"{path}: no .mcap file in it; {hint}")
@@ -46,7 +47,7 @@ def read_topics(files: Sequence[Path]) -> tuple[dict[str, Topic], str]:
         try:
             with file.open("rb") as stream:
                 if not MAGIC.startswith(stream.read(len(MAGIC))):
-                    raise RecordingError(f"{file}: not an MCAP file")
+                    raise RecordingError(f"{file}: not an MCAP file; {IMPORT}")
                 stream.seek(0)
                 _read_file(stream, topics)
         except OSError as error:

@@ -15,7 +15,7 @@ from .conditioning import CFC_CLASSES, filter_recording, remove_offset, select_c
 from .readers import READERS, read_source
 from .readers.units import G
 from .recording import Recording, RecordingError
-from .sensor_checks import doubtful_channels
+from .sensor_checks import doubtful_channels, gaps_in_time
 
 SHOWN_IN = {"acceleration": (G, "g"), "force": (1e3, "kN"), "displacement": (1e-3, "mm")}
 """For people to read; everything else is SI."""
@@ -48,7 +48,7 @@ def import_recording(given: argparse.Namespace) -> Recording:
     recording = read_source(given.source, names=given.names, cells=given.cells, recover=given.recover)
     if given.channels:
         recording = select_channels(recording, given.channels)
-    doubts = tuple(doubtful_channels(recording))  # before a filter smooths the signs away
+    doubts = (*gaps_in_time(recording), *doubtful_channels(recording))  # before a filter smooths the signs away
     recording = replace(recording, test=replace(recording.test, notes=recording.test.notes + doubts))
     if given.offset:
         recording = remove_offset(recording)
@@ -117,6 +117,8 @@ def _report(recording: Recording, bag: Path) -> str:
             speeds.setdefault(speed, []).append(body)
         stated = "; ".join(f"{speed:.4g} m/s: {', '.join(bodies)}" for speed, bodies in speeds.items())
         lines += ["", f"initial velocity {stated}"]
+    else:
+        lines += ["", "initial velocity not given: every body is at rest until the impact"]
     lines += ["", *(f"- {note}" for note in test.notes)] if test.notes else []
     return "\n".join([*lines, "", f"written to {bag} ({_size(bag)})"])
 

@@ -3,6 +3,7 @@
 dead      one value throughout
 clipped   the extreme value held for several samples, entered and left by more than one step of resolution
 stuck     one value, off the rest position, held for 10 ms or more after the impact
+missing   no value in between, of one channel or (a gap in time) of all; a channel may well begin late or end early
 """
 
 import numpy as np
@@ -16,18 +17,40 @@ STUCK_TIME = 0.010
 """s"""
 OFF_REST = 0.05
 """Share of the channel's range: a channel at rest may well show one value for long."""
+GAP = 1.5
+"""Of the sample period: a longer step of time lacks a sample; a shorter one is the clock's jitter."""
 
 
 def doubtful_channels(recording: Recording) -> list[str]:
-    """A line for each channel that looks faulty, and for each with values missing."""
+    """A line for each channel that looks faulty, and one for each with values missing."""
     notes = []
     for channel, values in zip(recording.test.channels, recording.values.T):
         valid = np.isfinite(values)
         if not valid.any():
             notes.append(f"{channel.name}: has no valid value")
-        elif fault := _fault(recording.time[valid], values[valid]):
+            continue
+        inside = slice(np.argmax(valid), len(valid) - np.argmax(valid[::-1]))
+        if not valid[inside].all():
+            notes.append(f"{channel.name}: {_missing(recording.time[inside], valid[inside])}")
+        if fault := _fault(recording.time[valid], values[valid]):
             notes.append(f"{channel.name}: {fault}")
     return notes
+
+
+def gaps_in_time(recording: Recording) -> list[str]:
+    """One line where samples are missing from all channels at once; none where time runs evenly."""
+    steps = np.diff(recording.time)
+    gaps = np.flatnonzero(steps > GAP * (recording.sample_period or np.inf))
+    if not len(gaps):
+        return []
+    longest = gaps[np.argmax(steps[gaps])]
+    many = "a gap" if len(gaps) == 1 else f"{len(gaps)} gaps, the longest"
+    return [f"time: {many} of {1e3 * steps[longest]:.4g} ms after {recording.time[longest]:.4f} s"]
+
+
+def _missing(time: np.ndarray, valid: np.ndarray) -> str:
+    at = time[~valid]
+    return f"{len(at)} sample{'s' * (len(at) > 1)} without a value, {at[0]:.4f} to {at[-1]:.4f} s"
 
 
 def _fault(time: np.ndarray, values: np.ndarray) -> str:

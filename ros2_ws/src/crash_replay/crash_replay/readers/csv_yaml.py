@@ -22,6 +22,9 @@ from ..yaml_schema import load_yaml, suggestion
 from .description import ChannelNames, Part, TestPart, unknown_bodies
 from .units import si_factor
 
+LONG, SPARSE = 10.0, 0.01
+"""s: no crash is that long and sampled that seldom. 10 ms of one, written in ms, look like it."""
+
 
 class CsvChannel(ChannelNames):
     quantity: Literal[tuple(SI_UNIT)]
@@ -128,7 +131,7 @@ def _is_number(cell: str) -> bool:
 
 
 def _check_time(path: Path, time: np.ndarray) -> None:
-    """Time is a number in every row and increases by a nanosecond or more."""
+    """Time is a number in every row, increases by a nanosecond or more, and is in s."""
     row = np.flatnonzero(np.isnan(time))
     if len(row):
         raise RecordingError(f"{path}: sample {row[0]}: time is missing")
@@ -138,4 +141,10 @@ def _check_time(path: Path, time: np.ndarray) -> None:
         raise RecordingError(
             f"{path}: sample {k}: time must increase from sample to sample, "
             f"but {time[k]:.9g} s follows {time[k - 1]:.9g} s"
+        )
+    if time[-1] - time[0] > LONG and np.median(np.diff(time)) > SPARSE:
+        raise RecordingError(
+            f"{path}: time runs from {time[0]:.6g} to {time[-1]:.6g} s "
+            f"with a sample every {np.median(np.diff(time)):.4g} s, "
+            "which is no crash: it must be in s; is it in ms?"
         )
