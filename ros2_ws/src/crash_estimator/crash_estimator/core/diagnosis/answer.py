@@ -14,7 +14,7 @@ from .layout import Layout, Place
 from .linearise import balance_of
 from .model import Model
 from .records import Record
-from .search import Round
+from .rounds import Round
 from .temper import CFC, SLOWEST
 from .trying import GAIN, Tried
 

@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from scipy.constants import g as G
-
 from crash_replay.recording import Recording
 
 from ..effects import EFFECTS
@@ -12,23 +10,21 @@ from ..effects.base import Effect
 from ..structure import ModelError, Structure
 from .additions import additions_of, structure_with
 from .answer import Ranked, StepReport, ranking_of, step_of
-from .assess import free_run, noise_floor
+from .assess import assess, free_run, noise_floor
+from .constancy import Drift, drift_of
+from .fit import Fit, fit
 from .misfit import MisfitWindow, misfit_windows
 from .model import Model, fit_model
-from .records import make_record
+from .records import Record, make_record
+from .rounds import Round, share_removed
 from .scales import make_scales
-from .search import LEAST_SHARE, Round, search, share_removed
+from .search import LEAST_SHARE, NEAR_THE_FLOOR, search
+from .sentence import MOST_AT_ONCE, sentence
 
 CELLS = 36
 """Of a free curve over its crush scale."""
 
 FINER_CELLS = 72
-NEAR_THE_FLOOR = 2.0
-"""Where the residual's mean square is within this factor of the noise's, a finer curve may be all that is missing."""
-
-
-MOST_AT_ONCE = 2
-"""Effects that are believed together: what takes three of them is more likely one that is not in the vocabulary."""
 
 
 @dataclass(frozen=True)
@@ -83,17 +79,27 @@ def diagnose(
     scales = make_scales(structure, records, CELLS)
     present = additions_of(structure, scales, effects)
     rounds, final = search(records, scales, effects, present)
-    if not final.left.whiteness.white and final.left.cost < NEAR_THE_FLOOR:
+    as_recorded = _in_the_sensors_noise(final, records)
+    left = assess(as_recorded, records)
+    if not final.left.whiteness.white and left.cost < NEAR_THE_FLOOR:
         finer = make_scales(structure, records, FINER_CELLS)
         refined = fit_model(structure, records, finer, final.additions)
-        if refined.left.whiteness.white or share_removed(final.left, refined.left) > LEAST_SHARE:
+        if refined.left.whiteness.white or share_removed(left, refined.left) > LEAST_SHARE:
             finer_rounds, finer_final = search(records, finer, effects, present)
             if finer_final.left.whiteness.white:
                 rounds, final = finer_rounds, finer_final
-    return _answer(structure, rounds, final, len(present))
+                as_recorded = _in_the_sensors_noise(final, records)
+    return _answer(structure, rounds, final, len(present), drift_of(as_recorded, records))
 
 
-def _answer(structure: Structure, rounds: list[Round], final: Model, present: int) -> Diagnosis:
+def _in_the_sensors_noise(model: Model, records: Sequence[Record]) -> Fit:
+    """The model's fit; made again where that was in a larger noise."""
+    found = model.fit
+    tempered = model.records[0].mix is not None
+    return fit(found.layout, records, (found.theta, found.trajectories)) if tempered else found
+
+
+def _answer(structure: Structure, rounds: list[Round], final: Model, present: int, drift: Drift) -> Diagnosis:
     first = rounds[0].before
     models = (first, *(round_.before for round_ in rounds[1:]))
     if models[-1] is not final:
@@ -102,13 +108,13 @@ def _answer(structure: Structure, rounds: list[Round], final: Model, present: in
     runs = [free_run(model.fit, model.records).rms for model in models]
     steps = tuple(step_of(*each, final) for each in zip(rounds, models, models[1:], zip(runs, runs[1:])))[: len(added)]
     white = final.left.whiteness.white
-    explained = white and len(added) <= MOST_AT_ONCE
+    explained = white and drift.constant and len(added) <= MOST_AT_ONCE
     verdict = ("effect_missing" if added else "adequate") if explained else "unexplained"
     floor = noise_floor(first.fit.layout, first.records)
     ranking = ranking_of(rounds[0], len(first.records))
     return Diagnosis(
         verdict=verdict,
-        text=_text(verdict, steps, ranking, first, final, floor),
+        text=sentence(verdict, steps, ranking, first, final, floor, drift),
         residual_rms=Rms(first.left.rms, final.left.rms, floor),
         free_run_rms=Rms(runs[0], runs[-1]),
         ranking=ranking,
@@ -120,30 +126,3 @@ def _answer(structure: Structure, rounds: list[Round], final: Model, present: in
         models=models,
     )
 
-
-def _text(verdict: str, steps, ranking, first: Model, final: Model, floor: float) -> str:
-    names = ", ".join(f"{step.effect} on {step.target}" for step in steps)
-    size = f"residual RMS {first.left.rms / G:.3g} -> {final.left.rms / G:.3g} g, noise floor {floor / G:.3g}"
-    if verdict == "adequate":
-        left = f"residual RMS {final.left.rms / G:.3g} g, noise floor {floor / G:.3g}"
-        return f"adequate: nothing significant is missing ({left})"
-    if verdict == "effect_missing":
-        advice = ""
-        rivals = ranking[0].confounded_with if ranking else ()
-        if rivals:
-            advice = f"; this cannot be told from {', '.join(rivals)}"
-            advice += " on one recording: record another speed" if len(first.records) == 1 else " on these recordings"
-        small = first.left.rms < NEAR_THE_FLOOR**0.5 * floor
-        why = f"; small, yet noise would not leave it ({steps[0].evidence:.0f} nats of evidence)" if small else ""
-        return f"effect missing: {names}; {size}, now white{why}{advice}"
-    if final.left.whiteness.white:
-        why = "one effect of another kind is likelier than so many"
-        return f"unexplained: {names} together leave only noise; {size}; {why}"
-    worst = final.left.whiteness.worst
-    layout = final.fit.layout
-    where = (
-        f"{layout.outputs[worst.output].channel} of {final.records[worst.record].test.id}, "
-        f"{worst.low:.0f} to {worst.high:.0f} Hz"
-    )
-    done = f"{names} {'explains' if len(steps) == 1 else 'explain'} part of it; " if steps else ""
-    return f"unexplained: {done}{size}; no candidate explains what is left, most of it in {where}"

@@ -14,9 +14,9 @@ from ..effects.base import AttachedBody, Effect, ElementForce, Gap, PairSpring, 
 from ..structure import Coefficient, Structure
 from .builder import Builder, Prior
 from .curves import ROUGHNESS, Curve, make_knots
+from .pairs import pair_of
 from .propagate import DRIVEN, FIXED, FREE
 from .records import DRIVEN_MODES, Record, outputs_of
-from .pairs import pair_of
 from .scales import Scales
 
 

@@ -30,8 +30,8 @@ from .live_start import carried_on
 from .misfit import misfit_windows
 from .model import Model
 from .records import FEWEST_SAMPLES, Record, make_record
+from .rounds import Round
 from .scales import Scales, make_scales
-from .search import Round
 
 MOST_CELLS = 36
 CELLS_IN_ALL = 90

@@ -13,9 +13,9 @@ from .live_start import carried_on
 from .model import Model
 from .motion import motion_of
 from .records import Record
+from .rounds import as_found
 from .scales import Scales
 from .screening import Screened, changes_law, embedding, screen
-from .search import as_found
 from .trying import HOPELESS, Tried, shortlist
 
 LEADERS = 2

@@ -1,57 +1,34 @@
 """The search for what is missing: try the candidates, add the best, until nothing is left or nothing helps."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from ..effects.base import ChannelError, Effect
-from .assess import Left, assess
+from ..effects.base import Effect
+from .assess import assess
 from .fit import HOTTER, Fit, fit
 from .layout import Addition, Layout, make_layout
 from .model import Model, fit_model
 from .motion import motion_of
 from .records import Record
-from .scales import Scales, make_scales
+from .rounds import Round, added, one_round, share_removed
+from .scales import Scales
 from .screening import embedding
-from .temper import tempered
 from .trajectory import Trajectory
-from .trying import GAIN, Tried, try_candidates
+from .trying import GAIN, Tried
+from .two_at_once import two_at_once
 
 SECOND_GAIN = 20.0
 """Nats for one more effect where those found leave white noise already."""
 
-TEMPERINGS = 3
-"""Times that the noise is taken as large as what the best candidate leaves."""
-
 MOST_STEPS = 4
 
-FIRST_ONES = 3
-"""Candidates that are tried with a second one at once."""
-
-MOST_LEFT = 100.0
-"""Mean square in units of the noise that the first one leaves: of a real structure no second one takes that."""
-
-PAIR_GAIN = 100.0
-"""Nats that each of two must gain that are found at once: there are thousands of pairs, and some mimic anything
-small."""
+NEAR_THE_FLOOR = 2.0
+"""Where the residual's mean square is within this factor of the noise's, a finer curve may be all that is missing."""
 
 LEAST_SHARE = 0.15
 """Of what the model before it leaves above the floor: an addition that removes less of it, and still leaves more than
 noise, is no explanation."""
-
-
-class Round(NamedTuple):
-    """The model before it, and all candidates for one more addition, best first."""
-
-    before: Model
-    tried: list[Tried]
-    as_recorded: Sequence[Tried] = ()  # in the sensors' noise, where `tried` is in a larger one
-
-    @property
-    def best(self) -> Tried | None:
-        return self.tried[0] if self.tried and self.tried[0].fit and self.tried[0].gain > GAIN else None
 
 
 def search(
@@ -63,7 +40,9 @@ def search(
     if final.left.whiteness.white:
         return rounds, final
     pair = two_at_once(records, scales, effects, given, rounds[0].as_recorded)
-    return _one_by_one(records, *pair, len(present)) if pair else (rounds, final)
+    if pair is None:
+        return rounds, final
+    return _one_by_one(records, pair.scales, effects, pair.model, pair.rounds, len(present))
 
 
 def _one_by_one(
@@ -83,42 +62,12 @@ def _one_by_one(
             # the candidate's fit has shown a better one of the model without it
             model, rounds = fair, rounds[:-1]
             continue
-        scales, larger = _with(records, scales, model, done.best)
+        scales, larger = added(records, scales, model, done.best)
         if not larger.left.whiteness.white:
             after = larger.left, assess(done.best.fit, records)
             if max(share_removed(done.before.left, left) for left in after) < LEAST_SHARE:
                 return rounds, done.before
         model = larger
-
-
-def _with(records: Sequence[Record], scales: Scales, model: Model, best: Tried) -> tuple[Scales, Model]:
-    start = best.fit
-    if isinstance(best.addition.effect, ChannelError):
-        # the measured motion was wrong, and with it the crushes that the curves reach over
-        scales, start = make_scales(scales.structure, records, scales.cells, start.trajectories), None
-    return scales, fit_model(scales.structure, records, scales, [*model.additions, as_found(best)], start)
-
-
-def two_at_once(
-    records: Sequence[Record], scales: Scales, effects: Mapping[str, Effect], model: Model, tried: Sequence[Tried]
-):
-    """Where no effect counts for itself in noise as large as what it leaves: two that leave only the sensors'.
-
-    The likeliest first ones, as recorded, each with the best second one -> what `_one_by_one` goes on from, or None.
-    """
-    found = []
-    likely = [one for one in tried if one.fit and one.gain > PAIR_GAIN][:FIRST_ONES]
-    for first in [one for one in likely if assess(one.fit, records).cost < MOST_LEFT]:
-        wider, larger = _with(records, scales, model, first)
-        seconds = try_candidates(records, wider, effects, larger)
-        if not seconds or not seconds[0].fit or seconds[0].gain < PAIR_GAIN:
-            continue
-        widest, both = _with(records, wider, larger, seconds[0])
-        if both.left.whiteness.white:
-            others = [one for one in tried if one is not first]
-            rounds = [Round(model, [first, *others]), Round(larger, seconds)]
-            found.append((widest, effects, both, rounds))
-    return max(found, key=lambda one: one[2].fit.evidence, default=None)
 
 
 def without_the_superseded(
@@ -162,46 +111,9 @@ def _round_again(round_: Round, before: Model, gain: float | None) -> Round:
     return round_._replace(before=before, tried=[best if gain is None else best._replace(gain=gain), *others])
 
 
-def share_removed(before: Left, after: Left) -> float:
-    """Of the mean square residual above that of the noise."""
-    return (before.cost - after.cost) / max(before.cost - 1.0, 1e-9)
-
-
-def as_found(tried: Tried) -> Addition:
-    """The addition, starting where its fit has ended."""
-    theta = tried.fit.theta
-    place = next(place for place in tried.fit.layout.places if place.addition is tried.addition)
-    shapes = {name: float(np.exp(theta[p])) for name, p in place.shapes.items()}
-    return replace(tried.addition, coefficient=float(theta[place.coefficient]), shapes=shapes)
-
-
 def _without(scales: Scales, model: Model, tried: Tried) -> Model:
     """The model refitted from where a candidate's fit has ended."""
     layout = model.fit.layout
     theta, motions = _narrowed(layout, tried.fit, model.records)
     found = fit(layout, model.records, (theta, motions))
     return model._replace(fit=found, left=assess(found, model.records, sharply=True))
-
-
-def one_round(records: Sequence[Record], scales: Scales, effects: Mapping[str, Effect], model: Model) -> Round:
-    """Candidates against the sensors' noise; where none leaves only that, against what the best of them leaves."""
-    tried = try_candidates(records, scales, effects, model, thorough=True)
-    done = Round(model, tried, tried)
-    if model.left.whiteness.white or (done.best and assess(done.best.fit, records).whiteness.white):
-        return done
-    for _ in range(TEMPERINGS):
-        left = assess(done.best.fit, done.before.records) if done.best else done.before.left
-        noisier = tempered(records, bounded(left.residual, records))
-        before = fit_model(scales.structure, noisier, scales, model.additions)
-        if before.left.whiteness.white:  # so it looks; the sensors' own noise decides
-            there = fit(model.fit.layout, records, (before.fit.theta, before.fit.trajectories))
-            decided = assess(there, records, sharply=True).whiteness
-            before = before._replace(left=before.left._replace(whiteness=decided))
-        done = Round(before, try_candidates(noisier, scales, effects, before), tried)
-    return done
-
-
-def bounded(residuals: Sequence[np.ndarray], records: Sequence[Record]) -> list[np.ndarray]:
-    """Residuals, and what was measured itself where a motion without bounds has left more."""
-    pairs = zip(residuals, (record.measured for record in records))
-    return [r if np.nanstd(r) < np.nanstd(measured) else measured for r, measured in pairs]

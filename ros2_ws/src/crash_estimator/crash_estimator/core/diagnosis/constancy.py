@@ -1,0 +1,142 @@
+"""Whether what a model leaves hangs on time: no effect of the vocabulary does, so that none of them explains it.
+
+A mass that grows, a push at some instant, a sensor that turns: two effects of the vocabulary can together come so close
+to one of these that their residual is white in every band. A score test (Rao 1948) looks where it would show. For each
+free body and each output let
+
+    its mass be m (1 + s(t)),   a force s(t) push it,   its sensor show (1 + s(t)) a,
+
+s(t) = sum of c_j cos(j pi t / T), j = 1 ... MODES; one of these at a time. With the whitened outputs' derivative D by
+the c_j, J by the model's parameters, whose prior has the precision L about mu, their residual r, and H = J'J + L, where
+all c_j are zero
+
+    u = D'r - D'J H^-1 (J'r - L (theta - mu)),   S = D'D - D'J H^-1 J'D,   u' S^-1 u has chi^2 of MODES.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_solve
+from scipy.special import chdtrc
+
+from .fit import Fit, solve
+from .linearise import Equations, linearise, predicted
+from .normal import Normal, may_diverge, whitened
+from .propagate import FREE
+from .records import Record
+
+MODES = 6
+"""Of time: the last one's half period is a sixth of the record, what rises faster shows in the bands of `whiteness`."""
+
+SIGNIFICANT = 0.001
+"""Probability that a right model fails anywhere."""
+
+TOLD = 0.01
+"""Share of a direction that the model's parameters must leave: the little that they leave of others, a curve's prior
+decides, which is no more than a good guess."""
+
+
+TOLD_APART = 12.0
+"""Difference of u' S^-1 u: six nats, as of candidates."""
+
+
+class Drift(NamedTuple):
+    """What the residual goes along with most, of all that may vary with time."""
+
+    constant: bool  # nothing varies significantly
+    probability: float  # that a right model looks as bad, over all that was looked at
+    what: str  # in words; several things where they cannot be told apart
+    share: float  # of the residual's square above that of noise, that it takes away
+
+
+def drift_of(fitted: Fit, records: Sequence[Record]) -> Drift:
+    """The test of one fit, in the noise of its records."""
+    layout = fitted.layout
+    free = [k for k, kind in enumerate(layout.kind) if kind == FREE]
+    names = [f"the mass of {layout.bodies[k]}" for k in free]
+    names += [f"a force on {layout.bodies[k]}" for k in free]
+    names += [f"the gain of {output.channel}" for output in layout.outputs]
+    normal = _normal_equations(fitted, records, free)
+    try:
+        score, information = _marginal(fitted, normal)
+    except LinAlgError:  # a motion without bounds: nothing can be said of it
+        return Drift(True, 1.0, names[0], 0.0)
+    blocks = [slice(first, first + MODES) for first in range(0, len(score), MODES)]
+    found = [(*_statistic(score[b], information[b, b]), name) for b, name in zip(blocks, names)]
+    square, freedom, _ = max(found)
+    least = min(float(chdtrc(f, s)) for s, f, _ in found)
+    probability = float(-np.expm1(len(found) * np.log1p(-min(least, 1.0 - 1e-12))))
+    alike = [name for s, _, name in sorted(found, reverse=True) if s > square - TOLD_APART]
+    share = (square - freedom) / max(normal.cost - normal.samples, 1.0)
+    return Drift(probability > SIGNIFICANT, probability, " or ".join(alike), float(np.clip(share, 0.0, 1.0)))
+
+
+def _marginal(fitted: Fit, normal: Normal) -> tuple[np.ndarray, np.ndarray]:
+    """u and S of all directions, each direction scaled to length one."""
+    layout, p = fitted.layout, fitted.layout.size
+    step = solve(layout, normal._replace(matrix=normal.matrix[:p, :p], vector=normal.vector[:p]), fitted.theta)
+    inside, scale = np.flatnonzero(step.free), step.scale[step.free]
+    size = np.sqrt(np.maximum(np.diagonal(normal.matrix)[p:], np.finfo(float).tiny))
+    cross = normal.matrix[inside, p:] * scale[:, None] / size
+    solved = cho_solve(step.factor, cross, check_finite=False)
+    pull = normal.vector[:p] - layout.prior.precision @ (fitted.theta - layout.prior.mean)
+    score = normal.vector[p:] / size - solved.T @ (pull[inside] * scale)
+    return score, normal.matrix[p:, p:] / np.outer(size, size) - cross.T @ solved
+
+
+def _statistic(score: np.ndarray, information: np.ndarray) -> tuple[float, int]:
+    """u' S^-1 u and its degrees of freedom: of directions that the model's parameters leave."""
+    values, vectors = np.linalg.eigh(information)
+    told = values > TOLD
+    return float(((vectors.T @ score)[told] ** 2 / values[told]).sum()), max(np.count_nonzero(told), 1)
+
+
+@may_diverge
+def _normal_equations(fitted: Fit, records: Sequence[Record], free: Sequence[int]) -> Normal:
+    """The fit's own, and after its parameters the directions of `drift_of`, in its order."""
+    layout = fitted.layout
+    size = layout.size + (2 * len(free) + len(layout.outputs)) * MODES
+    matrix, vector, cost, samples = np.zeros((size, size)), np.zeros(size), 0.0, 0
+    longest = max(float(record.time[-1]) for record in records)
+    for r, record in enumerate(records):
+        at = fitted.theta, fitted.trajectories[r]
+        modes = np.cos(np.pi * np.arange(1, MODES + 1) * (record.time / longest)[:, None])
+        equations = _with_motion(linearise(layout, record, r, *at), modes, free, layout.size)
+        residual, jacobian = whitened(layout, record, r, *at, equations)
+        flat = np.concatenate([jacobian, _of_sensors(fitted, record, r, equations, modes)], axis=2)
+        flat, residual = flat.reshape(residual.size, -1), residual.ravel()
+        c = np.concatenate([equations.columns, size + np.arange(-len(layout.outputs) * MODES, 0)])
+        matrix[np.ix_(c, c)] += flat.T @ flat
+        vector[c] += flat.T @ residual
+        cost += float(residual @ residual)
+        samples += residual.size
+    return Normal(matrix, vector, cost, samples, 0.0)
+
+
+def _with_motion(equations: Equations, modes: np.ndarray, free: Sequence[int], first: int) -> Equations:
+    """With one more column for each mode of each free body's mass, then of the force on it; modes (g, MODES)."""
+    linear, rows = equations.linear, equations.rows[:, free].T
+    acts = np.concatenate([-rows, np.repeat(np.abs(rows).max(axis=1, keepdims=True), len(modes), axis=1)])
+    acts = (acts[:, None] * modes.T).reshape(-1, len(modes))
+    more, others = np.arange(len(acts)), linear.others
+    wider = linear._replace(
+        others=others + len(acts),
+        column=np.concatenate([linear.column, others + more]),
+        body=np.concatenate([linear.body, np.tile(np.repeat(free, MODES), 2)]),
+        acts=np.concatenate([linear.acts, acts]),
+    )
+    columns = np.insert(equations.columns, others - 1, first + more)
+    return equations._replace(linear=wider, columns=columns)
+
+
+def _of_sensors(fitted: Fit, record: Record, r: int, equations: Equations, modes: np.ndarray) -> np.ndarray:
+    """(bins, q, q MODES) whitened derivative of the outputs by their gains' modes."""
+    shown = predicted(fitted.layout, record, r, fitted.theta, equations.rows)[0]
+    q = shown.shape[1]
+    found = np.zeros((record.bins, q, q, MODES))
+    for n in range(q):
+        column = (equations.sampling.weight[:, n] * shown[:, n])[:, None] * modes
+        np.add.at(found[:, n, n], record.bin[record.at], column[record.at])
+    found = found.reshape(record.bins, q, -1)
+    return found if record.mix is None else record.mix @ found

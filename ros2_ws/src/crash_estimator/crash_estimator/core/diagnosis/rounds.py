@@ -1,0 +1,78 @@
+"""One round of the search: all candidates for one more addition, in the sensors' noise or in a larger one."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..effects.base import ChannelError, Effect
+from .assess import Left, assess
+from .fit import fit
+from .layout import Addition
+from .model import Model, fit_model
+from .records import Record
+from .scales import Scales, make_scales
+from .temper import tempered
+from .trying import GAIN, Tried, try_candidates
+
+TEMPERINGS = 3
+"""Times that the noise is taken as large as what the best candidate leaves."""
+
+
+class Round(NamedTuple):
+    """The model before it, and all candidates for one more addition, best first."""
+
+    before: Model
+    tried: list[Tried]
+    as_recorded: Sequence[Tried] = ()  # in the sensors' noise, where `tried` is in a larger one
+
+    @property
+    def best(self) -> Tried | None:
+        return self.tried[0] if self.tried and self.tried[0].fit and self.tried[0].gain > GAIN else None
+
+
+def one_round(records: Sequence[Record], scales: Scales, effects: Mapping[str, Effect], model: Model) -> Round:
+    """Candidates against the sensors' noise; where none leaves only that, against what the best of them leaves."""
+    tried = try_candidates(records, scales, effects, model, thorough=True)
+    done = Round(model, tried, tried)
+    if model.left.whiteness.white or (done.best and assess(done.best.fit, records).whiteness.white):
+        return done
+    for _ in range(TEMPERINGS):
+        left = assess(done.best.fit, done.before.records) if done.best else done.before.left
+        noisier = tempered(records, bounded(left.residual, records))
+        before = fit_model(scales.structure, noisier, scales, model.additions)
+        if before.left.whiteness.white:  # so it looks; the sensors' own noise decides
+            there = fit(model.fit.layout, records, (before.fit.theta, before.fit.trajectories))
+            decided = assess(there, records, sharply=True).whiteness
+            before = before._replace(left=before.left._replace(whiteness=decided))
+        done = Round(before, try_candidates(noisier, scales, effects, before), tried)
+    return done
+
+
+def bounded(residuals: Sequence[np.ndarray], records: Sequence[Record]) -> list[np.ndarray]:
+    """Residuals, and what was measured itself where a motion without bounds has left more."""
+    pairs = zip(residuals, (record.measured for record in records))
+    return [r if np.nanstd(r) < np.nanstd(measured) else measured for r, measured in pairs]
+
+
+def added(records: Sequence[Record], scales: Scales, model: Model, best: Tried) -> tuple[Scales, Model]:
+    """The model with a candidate that was tried, and the scales that it then has."""
+    start = best.fit
+    if isinstance(best.addition.effect, ChannelError):
+        # the measured motion was wrong, and with it the crushes that the curves reach over
+        scales, start = make_scales(scales.structure, records, scales.cells, start.trajectories), None
+    return scales, fit_model(scales.structure, records, scales, [*model.additions, as_found(best)], start)
+
+
+def as_found(tried: Tried) -> Addition:
+    """The addition, starting where its fit has ended."""
+    theta = tried.fit.theta
+    place = next(place for place in tried.fit.layout.places if place.addition is tried.addition)
+    shapes = {name: float(np.exp(theta[p])) for name, p in place.shapes.items()}
+    return replace(tried.addition, coefficient=float(theta[place.coefficient]), shapes=shapes)
+
+
+def share_removed(before: Left, after: Left) -> float:
+    """Of the mean square residual above that of the noise."""
+    return (before.cost - after.cost) / max(before.cost - 1.0, 1e-9)
