@@ -40,6 +40,8 @@ decides, which is no more than a good guess."""
 TOLD_APART = 12.0
 """Difference of u' S^-1 u: six nats, as of candidates."""
 
+MOST_NAMED = 3
+
 
 class Drift(NamedTuple):
     """What the residual goes along with most, of all that may vary with time."""
@@ -67,7 +69,7 @@ def drift_of(fitted: Fit, records: Sequence[Record]) -> Drift:
     square, freedom, _ = max(found)
     least = min(float(chdtrc(f, s)) for s, f, _ in found)
     probability = float(-np.expm1(len(found) * np.log1p(-min(least, 1.0 - 1e-12))))
-    alike = [name for s, _, name in sorted(found, reverse=True) if s > square - TOLD_APART]
+    alike = [name for s, _, name in sorted(found, reverse=True) if s > square - TOLD_APART][:MOST_NAMED]
     share = (square - freedom) / max(normal.cost - normal.samples, 1.0)
     return Drift(probability > SIGNIFICANT, probability, " or ".join(alike), float(np.clip(share, 0.0, 1.0)))
 

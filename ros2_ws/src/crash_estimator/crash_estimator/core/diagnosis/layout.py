@@ -59,6 +59,7 @@ class Link:
     ends: tuple[int, int]
     crush_ends: tuple[int, int]  # -1, -1: measured
     tension: bool
+    pulls: bool = True  # without tension: a force beside the spring's may still be negative while that one is positive
     curve: Curve | None = None
     constant: int | None = None
     known_stiffness: float = 0.0
@@ -194,6 +195,7 @@ def _element_link(b, k, element, index, curve, scales, additions, places) -> Lin
         ends=(a, c),
         crush_ends=(-1, -1) if element.displacement else (a, c),
         tension=element.tension and not gap and not slope,
+        pulls=scales.pulls,
         curve=curve,
         constant=constant,
         known_stiffness=stiffness.value,

@@ -5,7 +5,8 @@
     F  = S (1 + c h(V)) + gate (C V + sum of c_i f_i)
 
 `gate` is 1 where the link carries and 0 where it is apart; it turns within one time step, in proportion to the time
-carried, so that a force that jumps at contact gives the right momentum whatever the step.
+carried, so that a force that jumps at contact gives the right momentum whatever the step. A link without tension that
+never pulls carries nothing where F is negative though S is not.
 """
 
 from typing import NamedTuple
@@ -112,12 +113,22 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
         parameters.append(link.gap)
         columns.append(-np.where(on_line, kx + kp, kx))
     unloads = on_line if slope is not None else rate < 0.0
-    return LinkForce(force, kx, kv, kp, loading, knot, weight, parameters, columns, open_ == 0.0, unloads)
+    apart = open_ == 0.0
+    if not link.pulls and _one_way(link):
+        acts = (force >= 0.0) | (static < 0.0)
+        apart |= ~acts
+        force, kx, kv, kp, weight = force * acts, kx * acts, kv * acts, kp * acts, weight * acts[:, None]
+        columns = [column * acts for column in columns]
+    return LinkForce(force, kx, kv, kp, loading, knot, weight, parameters, columns, apart, unloads)
+
+
+def _one_way(link: Link) -> bool:
+    return not link.tension or link.gap is not None
 
 
 def _gate(link: Link, x, rate, dt, static, on_line, slope):
     """(gate, its slope by crush, whether the spring carries) over g instants."""
-    if link.tension and link.gap is None:
+    if not _one_way(link):
         one = np.ones_like(x)
         return one, np.zeros_like(x), one
     carries = x > 0.0

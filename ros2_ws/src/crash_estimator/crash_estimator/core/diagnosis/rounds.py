@@ -61,7 +61,7 @@ def added(records: Sequence[Record], scales: Scales, model: Model, best: Tried) 
     start = best.fit
     if isinstance(best.addition.effect, ChannelError):
         # the measured motion was wrong, and with it the crushes that the curves reach over
-        scales, start = make_scales(scales.structure, records, scales.cells, start.trajectories), None
+        scales, start = make_scales(scales.structure, records, scales.cells, start.trajectories, scales.pulls), None
     return scales, fit_model(scales.structure, records, scales, [*model.additions, as_found(best)], start)
 
 

@@ -46,6 +46,7 @@ class Scales(NamedTuple):
     stiffness: np.ndarray  # (e,) N/m
     cells: int  # of a curve over its crush scale
     shortest_crush: float  # m
+    pulls: bool  # a compression-only element's damper still pulls until its spring is spent
 
     def element(self, name: str) -> int:
         return [e.name for e in self.structure.elements].index(name)
@@ -135,8 +136,9 @@ def attached_start(structure: Structure, record: Record, addition) -> tuple[floa
 
 
 def make_scales(
-    structure: Structure, records: Sequence[Record], cells: int, motions: Sequence[Trajectory] | None = None
-) -> Scales:
+    structure: Structure, records: Sequence[Record], cells: int, motions: Sequence[Trajectory] | None = None,
+    pulls: bool = True,
+) -> Scales:  # fmt: skip
     """motions: where the measured accelerations are known to err, a better idea of how the bodies move."""
     measured = tuple(motions or (measured_trajectory(structure, record) for record in records))
     outputs = outputs_of(structure)
@@ -162,7 +164,9 @@ def make_scales(
     shortest = min(SHORTEST_CRUSH, SHORTEST_SHARE * float(reach.max(initial=0.0))) or SHORTEST_CRUSH
     crush = np.maximum(reach, shortest)
     stiffness = force / crush
-    return Scales(structure, records, measured, body_force, crush_range, rate, crush, force, stiffness, cells, shortest)
+    return Scales(
+        structure, records, measured, body_force, crush_range, rate, crush, force, stiffness, cells, shortest, pulls
+    )
 
 
 def _peak(record: Record, rows: list[int]) -> float:

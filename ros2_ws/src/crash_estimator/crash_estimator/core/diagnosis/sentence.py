@@ -18,9 +18,15 @@ GOES_ALONG = 0.5
 
 def sentence(
     verdict: str, steps: Sequence[StepReport], ranking: Sequence[Ranked], first: Model, final: Model, floor: float,
-    drift: Drift,
+    drift: Drift, pulls: bool,
 ) -> str:  # fmt: skip
-    """first, final: the model as given and with what was added; floor: RMS of the sensors' noise, m/s^2."""
+    """first, final: the model as given and with what was added; floor: RMS of the sensors' noise, m/s^2; pulls: the
+    dampers of compression-only elements."""
+    said = _said(verdict, steps, ranking, first, final, floor, drift)
+    return said if pulls else f"{said}; with contacts that never pull, not even by their dampers"
+
+
+def _said(verdict, steps, ranking, first: Model, final: Model, floor: float, drift: Drift) -> str:
     names = ", ".join(f"{step.effect} on {step.target}" for step in steps)
     size = f"residual RMS {first.left.rms / G:.3g} -> {final.left.rms / G:.3g} g, noise floor {floor / G:.3g}"
     if verdict == "adequate":
