@@ -59,15 +59,25 @@ class Stage:
         self.heard: dict[str, dict[str, list]] = {}
         self.processes: list[subprocess.Popen] = []
         self.replayed: list[ReplayState] = []
+        self.others: list[Node] = []
 
     def close(self) -> None:
         for process in self.processes:
             process.terminate()
             process.wait(60)
         self.executor.shutdown()
-        for node in (*self.estimators, self.node):
+        for node in (*self.estimators, self.node, *self.others):
             node.destroy_node()
+        for node in self.others:
+            rclpy.shutdown(context=node.context)
         rclpy.shutdown()
+
+    def other(self, name: str) -> Node:
+        """A node that only publishes, of another process for all that the middleware knows."""
+        context = rclpy.Context()
+        rclpy.init(context=context, domain_id=self.domain)
+        self.others.append(Node(name, context=context))
+        return self.others[-1]
 
     def add_estimator(self, name: str = "estimator", **parameters) -> EstimatorNode:
         overrides = [Parameter(key, value=value) for key, value in parameters.items()]

@@ -13,7 +13,7 @@ from helpers_waiting import PATIENCE
 from numpy.testing import assert_array_equal
 
 from crash_estimator.core.methods import make_estimator
-from crash_estimator.nodes import estimator_model
+from crash_estimator.nodes import estimator_model, later
 from crash_replay.qos import LATCHED
 from crash_replay.recording import Recording, Test
 from crash_replay.ros_messages import stamp_ns
@@ -51,6 +51,35 @@ def test_what_is_published_is_what_the_loop_gives_to_the_last_bit(stage, model, 
     assert_array_equal(forces.mass, [10.0, np.nan])
     for event in heard["events"]:
         assert stamp_ns(event.header.stamp) == TIME_ZERO + round(event.time * 1e9)
+
+
+def most_that_waits(stage, node, recording) -> int:
+    """Messages of forces, while the recording goes by in what the node takes for a rush."""
+    stage.send_test(recording)
+    stage.send(recording, block=7)
+    most = 0
+    while len(stage.heard["estimator"]["parameters"]) < -(-len(recording) // 7):
+        most = max(most, len(node.topics.later.waiting))
+        stage.executor.spin_once(timeout_sec=0.02)
+    return most
+
+
+def test_in_a_rush_the_forces_come_later_and_are_the_same(stage, model, recording, monkeypatch):
+    monkeypatch.setattr(later, "RUSH", 0.0)
+    node = stage.add_estimator(model=model, method="mrls")
+    assert most_that_waits(stage, node, recording) > 1
+    assert_same(stage.wait_for("estimator", -(-len(recording) // 7)), offline(model, recording, "mrls"))
+    assert node.topics.looking.is_canceled()  # nothing is looked for any more
+
+
+def test_who_waits_for_an_answer_has_heard_the_forces_before(stage, model, recording, monkeypatch):
+    """Else a recording of a replay in lock-step could end without them."""
+    monkeypatch.setattr(later, "RUSH", 0.0)
+    node = stage.add_estimator(model=model, method="mrls")
+    stage.node.create_subscription(Answer, "answers", lambda message: None, LATCHED)
+    stage.spin_until(node.topics.answers.get_subscription_count, "somebody waits for answers")
+    assert most_that_waits(stage, node, recording) == 0
+    assert_same(stage.wait_for("estimator", -(-len(recording) // 7)), offline(model, recording, "mrls"))
 
 
 def test_several_side_by_side_each_with_its_method_and_settings(stage, model, recording):

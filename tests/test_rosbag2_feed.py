@@ -20,6 +20,7 @@ from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.model_file import load_model
 from crash_replay.bag import read_bag
+from crash_replay.qos import STREAM
 from crash_replay.ros_messages import CHANNEL_TYPES
 
 BAG = Path(__file__).resolve().parent.parent / "bags" / "frontal_engine_cab.mcap"
@@ -42,8 +43,9 @@ class Player:
             channels = reader.get_summary().channels.values()
             schemas = reader.get_summary().schemas
             self.messages = [(channel.topic, message.data) for _, channel, message in reader.iter_messages()]
+        node = stage.other("player")
         self.publishers = {
-            c.topic: stage.node.create_publisher(
+            c.topic: node.create_publisher(
                 TYPES[schemas[c.schema_id].name],
                 c.topic,
                 _qos(c.metadata["offered_qos_profiles"]) if offered else QoSProfile(depth=5000),
@@ -127,3 +129,22 @@ def test_the_replay_itself_is_not_made_to_send_channels(stage, whole):
     stage.spin(0.3)  # the estimator looks for them ten times a second
     assert not any(stage.node.count_subscribers(topic) for topic in channels())
     assert_array_equal(joined(heard["parameters"], "value"), whole[: sum(len(m.time_ns) for m in heard["parameters"])])
+
+
+def test_the_channels_of_a_replay_that_ends_are_not_listened_to(stage):
+    """Its topics go one by one: for a moment the channels are there without the samples.
+
+    Who listened to them from then on would hear the next replay twice, until that is found out.
+    """
+    stage.add_estimator(model=MODEL, method="mrls")
+    replay = stage.other("replay")
+    samples = replay.create_publisher(crash_msgs.msg.Samples, "samples", STREAM)
+    stage.node.destroy_publisher(stage.samples)
+    stage.spin_until(lambda: samples.get_subscription_count(), "the replay's samples are listened to")
+    stage.spin(0.3)  # the estimator looks around ten times a second
+    channel = replay.create_publisher(TYPES["geometry_msgs/msg/AccelStamped"], "channels/engine_ax", STREAM)
+    replay.destroy_publisher(samples)
+    stage.spin(0.5)
+    assert not channel.get_subscription_count()
+    player = Player(stage)  # of another process
+    stage.spin_until(player.found, "the estimator listens to the channels")

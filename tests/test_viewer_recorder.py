@@ -164,6 +164,21 @@ def test_each_pass_is_a_recording_and_one_complete_pass_in_a_file_is_enough(cras
     assert rows(second)["/signal/cab/measured"] == 1500
 
 
+def test_a_pass_is_complete_when_the_forces_are_drawn_too(crash, streams, tmp_path):
+    """After a rush they come later than the rest."""
+    path = tmp_path / "forces.rrd"
+    target = recorder(path)
+    late = [block for stream in streams.values() for block in stream[-10:] if isinstance(block, ForceBlock)]
+    in_time = {name: [b for b in stream if not any(b is after for after in late)] for name, stream in streams.items()}
+    feed(target, crash, in_time)
+    assert late and not target.complete
+    for block in late:
+        target.put(lambda block=block: block)
+    settle(target)
+    assert target.complete
+    assert target.close()[0].startswith(f"wrote {path}: mrls 1500 of 1500 samples")
+
+
 def test_a_replay_started_again_does_not_go_on_in_the_old_recording(crash, streams, tmp_path):
     target = recorder(tmp_path / "again.rrd")
     half = {name: stream[: len(stream) // 2] for name, stream in streams.items()}

@@ -126,7 +126,7 @@ class Live:
         passes = (lambda on=on: self._pass(bag, block=0, viewer=on).per_second for on in (False, True))
         rounds = self._in_turns(*passes)
         without, with_it = np.median(rounds, axis=0)
-        what = "the viewer's cost on the estimator's throughput, in a rush that it draws when it is over"
+        what = "the viewer's cost on the estimator's throughput, in a rush: forces are sent and all is drawn after it"
         said = f"{with_it:,.0f} /s with it", f"{without:,.0f} /s without"
         yield Row(what, *said, 1.0 - ratio(rounds, 1, 0), 0.05, least=False)
 

@@ -30,6 +30,11 @@ class Columns(NamedTuple):
     def __len__(self) -> int:
         return len(self.time_ns)
 
+    def only(self, fields: Sequence[str]) -> "Columns":
+        """These fields without the others, to keep for a while."""
+        of = self.of.only(fields) if isinstance(self.of, Parts) else {field: self.of[field] for field in fields}
+        return Columns(self.number, self.time_ns, of, ())
+
 
 class FilterFailure(Exception):
     """A filter that cannot go on; `done` is what it has said before that."""
@@ -106,6 +111,13 @@ class Parts(Mapping):
     def __getitem__(self, field: str) -> np.ndarray:
         part = self.table[:, self.places["parameters" if field == "value" else field]]
         return part.astype(np.uint8) if field in ("status", "state") else part
+
+    def only(self, fields: Sequence[str]) -> "Parts":
+        """A copy of the columns from the first of these fields to the last."""
+        places = {field: self.places[field] for field in fields}
+        first, end = min(p.start for p in places.values()), max(p.stop for p in places.values())
+        kept = {field: slice(p.start - first, p.stop - first) for field, p in places.items()}
+        return Parts(self.table[:, first:end].copy(), kept)
 
     def __iter__(self) -> Iterator[str]:
         return iter((*FIELDS, "value", "std", "innovation_std"))

@@ -12,6 +12,7 @@ from crash_replay.channel_messages import CARRIERS, decode
 from crash_replay.qos import EVERY_SAMPLE
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import CHANNEL_TYPES, stamp_ns, test_from_msg
+from crash_replay.subscribers import process_of
 
 from ..following.alignment import Alignment
 from ..kept import Rows
@@ -29,6 +30,7 @@ class ChannelFeed:
         self.samples_topic = node.resolve_topic_name(samples_topic)
         self.prefix = node.resolve_topic_name("channels") + "/"
         self.inputs: dict[str, Subscription] = {}
+        self.replays: set[bytes] = set()  # processes that publish samples, or have done so
         self.early: list[tuple[str, bytes]] = []
         self.complained: set[str] = set()
         self.alignment: Alignment | None = None
@@ -50,8 +52,12 @@ class ChannelFeed:
             self._put(name, data)
 
     def _look(self) -> None:
-        """Listen to the channels while there are no samples: before the test comes, or the first would be lost."""
-        if self.node.count_publishers(self.samples_topic):
+        """Listen to the channels while there are no samples: before the test comes, or the first would be lost.
+
+        Never to those of a replay, which has both: when it ends, its topics go one by one, the channels last.
+        """
+        if replays := self._publishers(self.samples_topic):
+            self.replays |= replays
             for subscription in self.inputs.values():
                 self.node.destroy_subscription(subscription)
             self.inputs.clear()
@@ -59,13 +65,18 @@ class ChannelFeed:
         for topic, types in self.node.get_topic_names_and_types():
             name = topic.removeprefix(self.prefix)
             if name != topic and name not in self.inputs and types[0] in CHANNEL_TYPES:
-                if self.node.count_publishers(topic):
+                # One that has just come may be found between two looks: its samples are then found before its channels.
+                if self._publishers(topic) - self.replays and not self._publishers(self.samples_topic):
                     put = partial(self._put, name)
                     self.inputs[name] = self.node.create_subscription(
                         CHANNEL_TYPES[types[0]], topic, put, EVERY_SAMPLE, raw=True
                     )
         if self.alignment and self.alignment.rows and time.monotonic() - self.last_put > QUIET:
             self.alignment.flush()
+
+    def _publishers(self, topic: str) -> set[bytes]:
+        """The processes that publish it."""
+        return {process_of(info) for info in self.node.get_publishers_info_by_topic(topic)}
 
     def _put(self, name: str, data: bytes) -> None:
         if self.alignment is None:

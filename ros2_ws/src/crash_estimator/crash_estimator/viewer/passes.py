@@ -1,6 +1,7 @@
 """One pass over the test: gathers the cast, then lets the show begin."""
 
 import time
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -19,6 +20,9 @@ COURTESY = 0.5
 
 FILE_PERIOD = 2.0
 """s of wall clock between batches for the file."""
+
+KINDS = {ParameterBlock, ResidualBlock, ForceBlock}
+"""What an estimator says of every sample."""
 
 UNKNOWN_TEST = TestBlock("test", "", "", 0, 0.0)
 
@@ -44,7 +48,7 @@ class Pass:
         self.test: TestBlock | None = None
         self.began: float | None = None
         self.ended = False
-        self.samples: dict[str, int] = {}  # drawn, by estimator
+        self.drawn: dict[str, Counter[type]] = {}  # samples, by estimator and kind of block
         self._waiting: list[Block | EventBlock | Finding] = []
         self._unsaved: list[Block | EventBlock | Finding] = []
         self._saved_at = 0.0  # monotonic s
@@ -78,8 +82,8 @@ class Pass:
             if time.monotonic() - self._saved_at > FILE_PERIOD:
                 self._save()
         for item in ready:
-            if isinstance(item, ResidualBlock):
-                self.samples[item.estimator] = self.samples.get(item.estimator, 0) + len(item.time_ns)
+            if isinstance(item, Block):
+                self.drawn.setdefault(item.estimator, Counter())[type(item)] += len(item.time_ns)
             if self.jury and isinstance(item, Block):
                 self.jury.hear(item)
         if self.jury and self.complete:
@@ -117,19 +121,22 @@ class Pass:
     def complete(self) -> bool:
         """Whether every estimator on stage has been drawn to the last sample."""
         total = self.test.samples if self.test else 0
-        return total > 0 and bool(self.samples) and min(self.samples.values()) >= total
+        return total > 0 and bool(self.drawn) and min(map(self._samples, self.drawn)) >= total
+
+    def _samples(self, name: str) -> int:
+        """Of an estimator, drawn in all there is to them: after a rush its forces come later than the rest."""
+        return min(self.drawn[name][kind] for kind in KINDS) if name in self.drawn else 0
 
     def report(self) -> str:
         """One line: the file, and how much of the test is in it."""
         total = f" of {self.test.samples}" if self.test else ""
         names = self.shows[0].cast.names if self.shows else ()
-        drawn = [f"{name} {self.samples.get(name, 0)}{total} samples" for name in names]
+        drawn = [f"{name} {self._samples(name)}{total} samples" for name in names]
         return f"wrote {self.path}: {', '.join(drawn) or 'no samples'}"
 
     def _meet(self, at_once: bool) -> None:
         """Begin once all expected estimators are known, or patience ends; take in who comes or changes later."""
-        kinds = {ParameterBlock, ResidualBlock, ForceBlock}
-        ready = [name for name, heads in self._heads.items() if heads.keys() == kinds]
+        ready = [name for name, heads in self._heads.items() if heads.keys() == KINDS]
         members = {name: self.attempt(lambda name=name: self._member(name)) for name in ready}
         present = [name for name in ready if members[name]]
         missing = self.test is None or any(name not in present for name in self.expected)
