@@ -13,11 +13,7 @@ def oscillator(stiffness: Coefficient = ESTIMATED, damping: Coefficient = Coeffi
     return Structure(
         "oscillator",
         (Body("block", 10.0, ("block_ax",)), Body("wall", fixed=True)),
-        (
-            Element(
-                "spring", ("block", "wall"), stiffness, damping, displacement="travel", velocity="speed", **element
-            ),
-        ),
+        (Element("spring", ("block", "wall"), stiffness, damping, displacement="travel", velocity="speed", **element),),
     )
 
 

@@ -33,9 +33,7 @@ def test_the_bundled_recording_is_missed_with_a_line(tmp_path, monkeypatch, caps
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(choice, "__file__", str(tmp_path / "somewhere/choice.py"))
-    with pytest.raises(
-        RecordingError, match=r"bags/hidden_effect\.mcap is not in .* start in the project's folder"
-    ):
+    with pytest.raises(RecordingError, match=r"bags/hidden_effect\.mcap is not in .* start in the project's folder"):
         choice.bundled_recording()
 
 

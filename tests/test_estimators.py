@@ -102,9 +102,7 @@ def test_mrls_that_never_rewinds_is_rls():
 @pytest.mark.parametrize("method", EXACT)
 def test_bounds_that_never_bind_change_nothing(method):
     recording = oscillator_recording(noise=NOISE)
-    bounded = oscillator(
-        stiffness=Coefficient(1.0e4, True, std=1.0e4, min=-1e12, max=1e12), damping=BOTH["damping"]
-    )
+    bounded = oscillator(stiffness=Coefficient(1.0e4, True, std=1.0e4, min=-1e12, max=1e12), damping=BOTH["damping"])
     assert_array_equal(
         [e.parameters for e in estimates_of(method, recording)],
         [e.parameters for e in estimates_of(method, recording, bounded)],
@@ -116,9 +114,7 @@ def test_bounds_that_never_bind_change_nothing(method):
 def test_a_negative_stiffness_is_clamped_to_zero_and_the_rest_estimated_again(method):
     recording = oscillator_recording(stiffness=2.0e4, damping=300.0, noise=NOISE)
     flipped = type(recording)(recording.test, recording.time_ns, recording.values * [1.0, -1.0, 1.0])
-    structure = oscillator(
-        stiffness=Coefficient(1.0e3, True, std=1.0e4, min=0.0, drift=0.0), damping=BOTH["damping"]
-    )
+    structure = oscillator(stiffness=Coefficient(1.0e3, True, std=1.0e4, min=0.0, drift=0.0), damping=BOTH["damping"])
     estimates = estimates_of(method, flipped, structure)
     values = np.array([e.parameters for e in estimates])
     status = np.array([e.status for e in estimates])

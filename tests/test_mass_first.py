@@ -34,7 +34,9 @@ def test_wrong_masses_of_the_model_are_replaced(recording, method):
         estimator = make_estimator(structure, recording.test, method, effective_mass=first)
         results[name] = run(estimator, recording.samples())
     late = [k for k, e in enumerate(results["right"]) if e.time_ns > 40_000_000]
-    rms = {n: np.sqrt(np.mean([estimates[k].innovation**2 for k in late], axis=0)) for n, estimates in results.items()}
+    rms = {
+        n: np.sqrt(np.mean([estimates[k].innovation ** 2 for k in late], axis=0)) for n, estimates in results.items()
+    }
     assert (rms["wrong"] / rms["right"]).max() > 1.5  # the equations contradict each other
     assert_allclose(rms["found"], rms["right"], rtol=0.1)
     assert estimator.description.extra[-2:] == ("cab.mass", "engine.mass")

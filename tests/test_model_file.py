@@ -60,11 +60,15 @@ MISTAKES = {
     "a text for a number": ("stiffness: 2e6", "stiffness: stiff", r"model.yaml:18: .*stiffness"),
     "known and estimated": ("estimate: true, shape", "estimate: true, value: 3, shape", r"model.yaml:13: .*not both"),
     "a value outside its bounds": (
-        "initial: 4.0e5, min: 0.0", "initial: -1, min: 0.0", r"model.yaml:9: .*min <= initial"
+        "initial: 4.0e5, min: 0.0",
+        "initial: -1, min: 0.0",
+        r"model.yaml:9: .*min <= initial",
     ),
     "a body that is not there": ("[engine, barrier]", "[engin, barrier]", r"no body 'engin'; did you mean 'engine'"),
     "an element onto itself": (
-        "[cab, engine]", "[cab, cab]", r"model.yaml:16.*two different bodies|two different bodies"
+        "[cab, engine]",
+        "[cab, cab]",
+        r"model.yaml:16.*two different bodies|two different bodies",
     ),
     "a free body without mass": ("{mass: 400, ", "{", r"body engine is free and needs a mass"),
     "a negative mass": ("mass: 400", "mass: -4", r"model.yaml:4: .*mass"),

@@ -15,6 +15,7 @@ TOO_OLD = '#!/bin/sh\ncase "$*" in *version_info*) exit 1; esac'
 WITHOUT_VENV = '#!/bin/sh\ncase "$*" in *ensurepip*) exit 1; esac'
 WITHOUT_HEADERS = '#!/bin/sh\ncase "$*" in *get_path*) echo /nowhere; exit; esac'
 
+
 @pytest.fixture
 def clone(tmp_path):
     return Clone(tmp_path)
@@ -248,7 +249,7 @@ def test_ci_is_make_test_and_fails_with_it(tmp_path):
 @pytest.mark.parametrize(
     "packages, output",
     [
-        ("echo ii; shift 3; for package; do echo \"ii $package\"; done", ""),
+        ('echo ii; shift 3; for package; do echo "ii $package"; done', ""),
         ("exit 1", "[set-up] the screenshot test will be skipped; for it: apt install mesa-vulkan-drivers libvulkan1 "),
     ],
     ids=["there", "missing, and sudo wants a password"],

@@ -23,7 +23,9 @@ def diagnosis_tables(found: Diagnosis) -> str:
         ranking_table(found.ranking),
         steps_table(found),
         revisions_table(found),
-        misfit_table(found.misfit_after, "where it still fails") if found.steps and found.verdict == "unexplained" else "",
+        misfit_table(found.misfit_after, "where it still fails")
+        if found.steps and found.verdict == "unexplained"
+        else "",
     )
     return "\n\n".join(part for part in parts if part)
 

@@ -115,7 +115,9 @@ class ElementPart(Part):
             raise ValueError("unloading takes a number (known), or `estimate: true` with an `initial` value above 0")
         for power in (*self.crush_terms, *self.rate_terms):
             if not 2 <= power <= 9:
-                raise ValueError(f"crush_terms and rate_terms have powers from 2 to 9 (the first is stiffness, damping), got {power}")
+                raise ValueError(
+                    f"crush_terms and rate_terms have powers from 2 to 9 (the first is stiffness, damping), got {power}"
+                )
         if self.velocity and not self.displacement:
             raise ValueError("`velocity` goes with `displacement`")
         return self
@@ -199,7 +201,8 @@ def model_path(name_or_path: str | Path) -> Path:
         near = get_close_matches(str(name_or_path), ready, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise ModelError(
-            f"there is no model {str(name_or_path)!r}: give one of {', '.join(ready)}, or the path of a .yaml file{hint}"
+            f"there is no model {str(name_or_path)!r}: give one of {', '.join(ready)}, "
+            f"or the path of a .yaml file{hint}"
         )
     return ready[str(name_or_path)]
 

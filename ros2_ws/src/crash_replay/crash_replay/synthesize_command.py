@@ -42,7 +42,10 @@ def main() -> None:
     )
     parser.add_argument("--force", action="store_true", help="replace BAG where it exists")
     parser.add_argument(
-        "--seed", type=_whole, default=BUNDLED_SEED, metavar="N",
+        "--seed",
+        type=_whole,
+        default=BUNDLED_SEED,
+        metavar="N",
         help="of the noise and of what is drawn (default %(default)s)",
     )
     parser.add_argument("--rate", type=_positive, metavar="HZ", help="sample rate, instead of the scenario's")

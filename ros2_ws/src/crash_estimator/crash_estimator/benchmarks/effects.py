@@ -22,11 +22,15 @@ TIMED = ("coulomb_friction", "viscous_damping", "plastic_unloading", "added_mass
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="effects", description=__doc__.partition(": ")[2])
-    parser.add_argument("--cases", type=int, metavar="N", help="only the first N of the plan, which is mixed; default all")
+    parser.add_argument(
+        "--cases", type=int, metavar="N", help="only the first N of the plan, which is mixed; default all"
+    )
     parser.add_argument("--case", metavar="NAME", help="only this one, with its row of results, and write nothing")
     parser.add_argument("--like", metavar="TEXT", help="only cases with this in their names, such as dummy/clearance")
     parser.add_argument("--seeds-from", type=int, default=SEEDS, metavar="N", help="below the default for development")
-    parser.add_argument("--results", type=Path, default=Path("out/missing-effects.jsonl"), help="resumed where it exists")
+    parser.add_argument(
+        "--results", type=Path, default=Path("out/missing-effects.jsonl"), help="resumed where it exists"
+    )
     parser.add_argument("--to", type=Path, default=Path("docs/missing-effects.md"), metavar="PAGE.md")
     parser.add_argument("--processes", type=int, default=os.cpu_count(), metavar="N")
     parser.add_argument("--fresh", action="store_true", help="drop the results there are")

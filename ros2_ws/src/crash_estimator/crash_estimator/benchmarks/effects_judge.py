@@ -41,7 +41,11 @@ def judge(case: Case) -> dict:
     try:
         found = diagnose(structure, recordings)
     except (ModelError, RecordingError, ArithmeticError, ValueError) as error:  # a failed answer, not a failed run
-        return row | {"verdict": "error", "error": f"{type(error).__name__}: {error}", "seconds": process_time() - start}
+        return row | {
+            "verdict": "error",
+            "error": f"{type(error).__name__}: {error}",
+            "seconds": process_time() - start,
+        }
     return row | {"seconds": process_time() - start} | _answer(found)
 
 
@@ -112,7 +116,12 @@ def kind_of(case: Case) -> str:
     return "nothing" if not effects else "outside" if effects[0] in OUTSIDE else "one" if len(effects) == 1 else "two"
 
 
-WANTED = {"nothing": verdict_is("adequate"), "one": right_first, "two": both_found, "outside": verdict_is("unexplained")}
+WANTED = {
+    "nothing": verdict_is("adequate"),
+    "one": right_first,
+    "two": both_found,
+    "outside": verdict_is("unexplained"),
+}
 """Kind -> whether a row is what is asked for."""
 
 

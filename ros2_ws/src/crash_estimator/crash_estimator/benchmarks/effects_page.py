@@ -31,13 +31,15 @@ class Judged(NamedTuple):
 
 def page(rows: Sequence[dict], times: Sequence[dict], planned: int, code: str) -> str:
     drawn = [Judged(case_of(row["case"]), row) for row in rows if "not_drawn" not in row]
-    counts = f"{len(drawn)} cases judged of {planned} planned, {len(rows) - len(drawn)} could not be drawn; code {code}."
+    counts = (
+        f"{len(drawn)} cases judged of {planned} planned, {len(rows) - len(drawn)} could not be drawn; code {code}."
+    )
     gaps = sum(j.kind == "one" and right_first(j.row) and a_stop_for_a_gap(j.row) for j in drawn)
     counts += f" A stop named for a gap (see below) counts as right in {gaps} of them."
     parts = [
-        HEAD, counts, "## Asked and reached", _asked(drawn, times), "## By effect", _by_effect(drawn), "## By structure",
-        _by_structure(drawn), "## Verdicts", _verdicts(drawn), "## Coefficients", _coefficients(drawn), "## Two effects at once",
-        _two(drawn), "## Where it gets hard", _hard(drawn), "## Time", _time(times), "## How the cases are made", HOW,
+        HEAD, counts, "## Asked and reached", _asked(drawn, times), "## By effect", _by_effect(drawn),
+        "## By structure", _by_structure(drawn), "## Verdicts", _verdicts(drawn), "## Coefficients", _coefficients(drawn),
+        "## Two effects at once", _two(drawn), "## Where it gets hard", _hard(drawn), "## Time", _time(times), "## How the cases are made", HOW,
         "## Cases that were not right", _not_right(drawn),
     ]  # fmt: skip
     return "\n\n".join(parts) + "\n"
@@ -67,18 +69,32 @@ def _asked(drawn: Sequence[Judged], times: Sequence[dict]) -> str:
         (f"at {noise:g} g", "98 %", _share([j for j in two if j.case.noise == noise], right_first)) for noise in NOISES
     ]
     rows += [
-        ("`adequate` where nothing is hidden, two recordings", "98 %", _share(_pick(drawn, "nothing", 2), verdict_is("adequate"))),
+        (
+            "`adequate` where nothing is hidden, two recordings",
+            "98 %",
+            _share(_pick(drawn, "nothing", 2), verdict_is("adequate")),
+        ),
         ("`unexplained` outside the vocabulary", "98 %", _share(_pick(drawn, "outside", 2), verdict_is("unexplained"))),
         ("RMS over noise floor after adding, median", "1.05", f"{median(ratios):.3f}"),
         ("coefficient within 3 sigma", "95 %", Share(sum(p <= 3.0 for p in pulls), len(pulls))),
         ("one recording: right first", "85 %", _share(one, right_first)),
-        ("one recording: wrong, and its rival not named", "none", f"{sum(not rival_named(j.row) for j in wrong)} of {len(one)}"),
-        ("one recording: `adequate` where nothing is hidden", "", _share(_pick(drawn, "nothing", 1), verdict_is("adequate"))),
+        (
+            "one recording: wrong, and its rival not named",
+            "none",
+            f"{sum(not rival_named(j.row) for j in wrong)} of {len(one)}",
+        ),
+        (
+            "one recording: `adequate` where nothing is hidden",
+            "",
+            _share(_pick(drawn, "nothing", 1), verdict_is("adequate")),
+        ),
         ("two effects at once, 1 g: both found, nothing else", "80 %", _share(_pick(drawn, "two", 2), both_found)),
         ("dummy, two recordings, all candidates, median", "2 s", _seconds([t["time"]["wall"] for t in times])),
         ("one update of the live ranking, median", "0.1 s", _seconds([u for t in times for u in t["time"]["updates"]])),
     ]
-    return markdown_table(("", "asked", "reached (95 % interval)"), [(what, asked, str(got)) for what, asked, got in rows])
+    return markdown_table(
+        ("", "asked", "reached (95 % interval)"), [(what, asked, str(got)) for what, asked, got in rows]
+    )
 
 
 def _seconds(values: Sequence[float]) -> str:
@@ -95,7 +111,9 @@ def _by_structure(drawn: Sequence[Judged]) -> str:
     return _grid("structure", list(STRUCTURES), two, one, lambda j: j.case.structure)
 
 
-def _grid(name: str, keys: Sequence[str], two: Sequence[Judged], one: Sequence[Judged], key: Callable[[Judged], str]) -> str:
+def _grid(
+    name: str, keys: Sequence[str], two: Sequence[Judged], one: Sequence[Judged], key: Callable[[Judged], str]
+) -> str:
     head = (name, *(f"{noise:g} g" for noise in NOISES), "two recordings, in all", "one recording")
     rows = []
     for this in (*keys, "all"):
@@ -115,7 +133,9 @@ def _verdicts(drawn: Sequence[Judged]) -> str:
     for recordings in (2, 1):
         for kind, hidden in kinds:
             chosen = _pick(drawn, kind, recordings)
-            groups = {hidden: chosen} if hidden else {f"`{e}`": [j for j in chosen if e in j.case.effects] for e in OUTSIDE}
+            groups = (
+                {hidden: chosen} if hidden else {f"`{e}`": [j for j in chosen if e in j.case.effects] for e in OUTSIDE}
+            )
             for name, group in groups.items():
                 if group:
                     rows.append((name, str(recordings), *(_share(group, verdict_is(v)).short for v in VERDICTS)))
@@ -135,7 +155,9 @@ def _coefficients(drawn: Sequence[Judged]) -> str:
         floor = median([row["rms"][1] / row["rms"][2] for row in right])
         within = Share(sum(p <= 3.0 for p in pulls), len(pulls))
         rows.append((_code(effect), f"{100 * median(off):.2g} %", f"{median(pulls):.2f}", str(within), f"{floor:.3f}"))
-    return markdown_table(("effect", "median error", "median error / sigma", "within 3 sigma", "median RMS / floor"), rows)
+    return markdown_table(
+        ("effect", "median error", "median error / sigma", "within 3 sigma", "median RMS / floor"), rows
+    )
 
 
 def _two(drawn: Sequence[Judged]) -> str:
@@ -143,7 +165,9 @@ def _two(drawn: Sequence[Judged]) -> str:
     rows = []
     for structure in (*STRUCTURES, "all"):
         these = [j for j in chosen if structure in ("all", j.case.structure)]
-        rows.append((_code(structure), str(_share(these, both_found)), str(_share(these, verdict_is("effect_missing")))))
+        rows.append(
+            (_code(structure), str(_share(these, both_found)), str(_share(these, verdict_is("effect_missing"))))
+        )
     return markdown_table(("structure", "both found, nothing else", "`effect_missing`"), rows)
 
 
@@ -184,8 +208,10 @@ def _time(times: Sequence[dict]) -> str:
         [
             ("`diagnose`, dummy, two recordings of 90 ms at 10 kHz, wall", *_line([t["time"]["wall"] for t in times])),
             ("the same, CPU", *_line([t["time"]["cpu"] for t in times])),
-            ("one update of the live ranking, dummy, one other recording beside it", f"{median(updates):.3g} s", f"{worst:.3g} s",
-             str(len(updates))),
+            (
+                "one update of the live ranking, dummy, one other recording beside it",
+                f"{median(updates):.3g} s", f"{worst:.3g} s", str(len(updates)),
+            ),
         ],
     )  # fmt: skip
 

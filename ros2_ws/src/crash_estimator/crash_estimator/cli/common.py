@@ -50,7 +50,9 @@ def parse_settings(pairs: list[str]) -> dict[str, float | int | bool]:
             value: float | int | bool = text == "true" if text in ("true", "false") else float(text)
         except ValueError:
             raise ModelError(f"a setting is written NAME=NUMBER, such as forgetting=0.98, got {pair!r}") from None
-        settings[name.strip()] = int(value) if isinstance(value, float) and text.strip().lstrip("+-").isdigit() else value
+        settings[name.strip()] = (
+            int(value) if isinstance(value, float) and text.strip().lstrip("+-").isdigit() else value
+        )
     return settings
 
 

@@ -78,12 +78,20 @@ class Actions:
             if action.kind == "factor":
                 per_unit[k, j] = static[k] * action.force(motion.rate[[k]])[0]
             elif action.kind == "element" and law.carries[k]:
-                here = ElementMotion(*(np.array([x]) for x in (motion.time, motion.crush[k], motion.rate[k], law.peak[k], static[k])))
+                here = ElementMotion(
+                    *(np.array([x]) for x in (motion.time, motion.crush[k], motion.rate[k], law.peak[k], static[k]))
+                )
                 per_unit[k, j] = action.force(here)[0]
         return per_unit
 
     def added(
-        self, known: np.ndarray, gradient: np.ndarray, motion: Motion, per_unit: np.ndarray, slopes: np.ndarray, theta: np.ndarray
+        self,
+        known: np.ndarray,
+        gradient: np.ndarray,
+        motion: Motion,
+        per_unit: np.ndarray,
+        slopes: np.ndarray,
+        theta: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """known (q,), gradient (q, p), and (q,) by which the elements' part of each equation has been multiplied.
 
@@ -159,10 +167,12 @@ class Actions:
 
 
 def _adds_mass(action: Action, body: int) -> float:
-    """kg of a body's mass for one unit of an action's coefficient, where it is estimated; known ones are in the mass."""
+    """kg of a body's mass for one unit of an action's coefficient where it is estimated; known ones are in the mass."""
     if not action.coefficient.estimated:
         return 0.0
-    return float(action.kind == "mass" and action.at == body) - float(action.kind == "inertia" and action.lighter == body)
+    return float(action.kind == "mass" and action.at == body) - float(
+        action.kind == "inertia" and action.lighter == body
+    )
 
 
 def coefficients(structure: Structure, description: Description, last: Estimate) -> np.ndarray:
@@ -176,7 +186,7 @@ def coefficients(structure: Structure, description: Description, last: Estimate)
 def beside_the_springs(
     structure: Structure, c: np.ndarray, element: int, motion: ElementMotion
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(g,) N in parallel to an element that carries, and (g,) what its static force is multiplied by; c of each action."""
+    """(g,) N in parallel to an element that carries, and (g,) a factor on its static force; c of each action."""
     given = structure.elements[element].factor
     parallel = np.zeros_like(motion.crush)
     factor = np.ones_like(parallel) if given is None else given(motion.rate)

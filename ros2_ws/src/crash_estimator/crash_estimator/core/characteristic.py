@@ -60,9 +60,11 @@ class Characteristic(NamedTuple):
 def characteristics(
     structure: Structure, description: Description, estimates: Sequence[Estimate]
 ) -> tuple[Characteristic, ...]:
-    """One for each element, from the samples after the impact: its spring and damper, without the structure's actions."""
+    """One for each element, from the samples after the impact: spring and damper, without the structure's actions."""
     after = [estimate for estimate in estimates if estimate.time_ns >= 0]
-    return tuple(_characteristic(k, element, structure, description, after) for k, element in enumerate(structure.elements))
+    return tuple(
+        _characteristic(k, element, structure, description, after) for k, element in enumerate(structure.elements)
+    )
 
 
 def _characteristic(

@@ -88,9 +88,7 @@ class Estimator:
         else:
             noise = np.diag(np.nan_to_num(regression.noise))
             nothing = np.zeros_like(update.clamped)
-            update = update._replace(
-                clamped=nothing, innovation_covariance=noise, events=(), expected_error=(0.0, 0.0)
-            )
+            update = update._replace(clamped=nothing, innovation_covariance=noise, events=(), expected_error=(0.0, 0.0))
         dropped, drop_events = self._dropouts(state.dropped, motion)
         status = self.regressor.status(law, update.clamped)
         estimate = self._estimate(

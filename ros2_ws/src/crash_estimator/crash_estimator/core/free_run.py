@@ -94,7 +94,8 @@ class _System:
     """The right-hand side, with what is measured interpolated between samples."""
 
     def __init__(
-        self, structure: Structure, laws: tuple[Characteristic, ...], c: np.ndarray, time: np.ndarray, after: Sequence[Estimate]
+        self, structure: Structure, laws: tuple[Characteristic, ...], c: np.ndarray, time: np.ndarray,
+        after: Sequence[Estimate],
     ):  # fmt: skip
         self.structure, self.c = structure, c
         self.laws, self.ends, self.time = laws, structure.ends, time

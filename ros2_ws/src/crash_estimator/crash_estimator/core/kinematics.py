@@ -100,7 +100,16 @@ class Kinematics:
         elements = np.zeros(len(self.structure.elements))
         forces = np.zeros(len(self.structure.equations))
         return KinematicState(
-            -1, channels, channels, bodies, forces, self.initial_displacement, self.initial_velocity, bodies, elements, elements
+            -1,
+            channels,
+            channels,
+            bodies,
+            forces,
+            self.initial_displacement,
+            self.initial_velocity,
+            bodies,
+            elements,
+            elements,
         )
 
     def step(self, state: KinematicState, sample: Sample) -> tuple[KinematicState, Motion]:
@@ -111,7 +120,11 @@ class Kinematics:
         values = np.where(self.offsets, sample.values - state.offset, sample.values)
         acceleration = self._body_accelerations(values)
         if before_impact:
-            dt, displacement, velocity = 0.0, self.initial_displacement + self.initial_velocity * sample.time, state.velocity
+            dt, displacement, velocity = (
+                0.0,
+                self.initial_displacement + self.initial_velocity * sample.time,
+                state.velocity,
+            )
             now = state.acceleration
         else:
             dt = (sample.time_ns - max(state.time_ns, 0)) * 1e-9
@@ -125,7 +138,12 @@ class Kinematics:
             state = self._learn_noise(state, acceleration, measured)._replace(crush=crush, rate=rate)
         else:
             state = state._replace(
-                time_ns=sample.time_ns, displacement=displacement, velocity=velocity, acceleration=now, crush=crush, rate=rate
+                time_ns=sample.time_ns,
+                displacement=displacement,
+                velocity=velocity,
+                acceleration=now,
+                crush=crush,
+                rate=rate,
             )
         noise, offset_variance = self._noise(state, dt)
         return state, Motion(

@@ -34,9 +34,7 @@ class MassFirst:
         self.structure, self.masses, self.make = structure, masses, make
         self._made: tuple[tuple[float, ...], Any] = ((), make(structure))  # the newest: masses change rarely
         d, m = self._made[1].description, masses.description
-        self.description = d._replace(
-            extra=d.extra + m.parameters, extra_units=d.extra_units + m.parameter_units
-        )
+        self.description = d._replace(extra=d.extra + m.parameters, extra_units=d.extra_units + m.parameter_units)
 
     def init(self) -> MassFirstState:
         return MassFirstState(self.masses.init(), (), self._second(()).init())

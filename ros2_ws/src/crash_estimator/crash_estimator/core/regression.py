@@ -33,7 +33,9 @@ class Regression(NamedTuple):
     gradient: np.ndarray  # (q, p) Psi; zero columns for parameters that are not active
     measured: np.ndarray  # (q,) NaN where there is no valid measurement
     active: np.ndarray  # (p,) whether the parameter is estimated at this sample
-    walk: np.ndarray  # (p,) relative variance of a random walk: drift^2 times the e-folds of crush since the last sample
+    walk: (
+        np.ndarray
+    )  # (p,) relative variance of a random walk: drift^2 times the e-folds of crush since the last sample
     noise: np.ndarray  # (q,) variance of the measurement, given or from before the impact; NaN where not known
     dt: float  # s since the last sample
     time: float = 0.0  # s since the impact
@@ -108,7 +110,9 @@ class Regressor:
         self.estimated = np.array([p.coefficient.estimated for p in parameters], dtype=bool)
         self.value = np.where(self.estimated, 0.0, [p.coefficient.value for p in parameters])
         self.known_unloading = np.array([e.unloading or 0.0 for e in structure.elements])
-        self.of_spring = np.array([p.is_stiffness or p.is_unloading or p.unit.startswith("N/m^") for p in parameters], dtype=bool)
+        self.of_spring = np.array(
+            [p.is_stiffness or p.is_unloading or p.unit.startswith("N/m^") for p in parameters], dtype=bool
+        )
         self.drift_squared = np.array([self._drift(p) ** 2 for p in parameters])
         self.every = tuple(  # of all parameters, the actions' too: element, is_stiffness, estimated
             np.array(column)

@@ -108,7 +108,7 @@ class EffectSpec:
 
 @dataclass(frozen=True)
 class Action:
-    """An effect at work that no element or body has a place for; `core.effects.applied` makes them, `core.actions` acts."""
+    """An effect that no element or body has a place for; `core.effects.applied` makes them, `core.actions` acts."""
 
     name: str  # of its parameter, such as door_rib.coulomb_friction
     unit: str
@@ -160,7 +160,9 @@ class Structure:
                 raise ModelError(f"model {self.name}: element {element.name} has a known and an estimated unloading")
             for term in element.terms:
                 if term.of not in ("crush", "rate") or term.power < 2:
-                    raise ModelError(f"model {self.name}: element {element.name}: a further power is 2 or more, got {term}")
+                    raise ModelError(
+                        f"model {self.name}: element {element.name}: a further power is 2 or more, got {term}"
+                    )
         if not self.equations:
             raise ModelError(f"model {self.name} has no equation to fit: give a free body an acceleration channel")
 
@@ -249,7 +251,7 @@ class Structure:
         return not (more or self.actions or any(body.carried_by for body in self.bodies))
 
     def reduced_mass(self, element: int) -> float:
-        """Of the two bodies of an element; a driven or fixed one counts as infinitely heavy, a carried one as its carrier."""
+        """Of the two bodies of an element; a driven or fixed one is infinitely heavy, a carried one its carrier."""
         ends = [self.bodies[k] for k in self.ends[element]]
         ends = [self.bodies[self.body_index[end.carried_by]] if end.carried_by else end for end in ends]
         inverse = sum(1.0 / body.mass for body in ends if body.free and body.mass)
@@ -271,7 +273,9 @@ class Structure:
         wanted += [(f"body {b.name}", b.force, "force") for b in self.bodies if b.force]
         wanted += [(f"element {e.name}", e.displacement, "displacement") for e in self.elements if e.displacement]
         wanted += [(f"element {e.name}", e.velocity, "velocity") for e in self.elements if e.velocity]
-        wanted += [(f"effect {e.type}", e.target, "acceleration") for e in self.effects if self._names_a_channel(e, wanted)]
+        wanted += [
+            (f"effect {e.type}", e.target, "acceleration") for e in self.effects if self._names_a_channel(e, wanted)
+        ]
         return wanted
 
     def _names_a_channel(self, effect: EffectSpec, wanted: list[tuple[str, str, str]]) -> bool:

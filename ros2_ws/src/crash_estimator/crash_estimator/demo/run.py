@@ -227,4 +227,3 @@ class Run:
             self.terminal.say(f"no picture of it: {error}")
         else:
             self.terminal.say(f"its picture: {near(picture.absolute())}")
-

@@ -79,9 +79,7 @@ def columns_of(estimates: Sequence[Estimate]) -> Columns:
     return Columns(estimates[0].number, np.array([e.time_ns for e in estimates]), of, events)
 
 
-def _follow_compiled(
-    estimator: CompiledEstimator, state: CompiledState, rows: Rows
-) -> tuple[CompiledState, Columns]:
+def _follow_compiled(estimator: CompiledEstimator, state: CompiledState, rows: Rows) -> tuple[CompiledState, Columns]:
     before = state.last_row
     state, table = estimator.follow(state, rows.time_ns, rows.values)
     value = table[:, estimator.columns["parameters"]]

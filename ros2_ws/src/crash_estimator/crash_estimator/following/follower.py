@@ -15,6 +15,7 @@ from ..kept import Kept, Rows
 from .checkpoints import Checkpoints
 from .columns import Columns, follow
 
+
 class Follower:
     def __init__(self, estimator: AnyEstimator, kept: Kept, floor: int = 0):
         """floor: number of the first sample that counts; those before are left out, as if never seen."""

@@ -137,7 +137,7 @@ def vibrating(scenario: Scenario, seeds: int) -> tuple[Truth, Iterator[Trial]]:
 
 
 def arma(scenario: Scenario, seeds: int) -> tuple[Truth, Iterator[Trial]]:
-    """The same with noise that is ARMA(1,2): its coefficients are the best fit to `vibrating`'s, its variance 60 too."""
+    """The same with noise that is ARMA(1,2): its coefficients the best fit to `vibrating`'s, its variance 60 too."""
 
     def noise(time: np.ndarray, generator: np.random.Generator) -> np.ndarray:
         eps = np.sqrt(18.0) * generator.standard_normal(len(time) + ARMA_SETTLED)

@@ -32,7 +32,8 @@ def write_page(folder: Path, seeds: int) -> None:
     figures.mkdir(parents=True, exist_ok=True)
     page = [HEAD.format(seeds=seeds)]
     thesis, of_the_model = (
-        [noise_orders(which, seeds, noise=noise) for which in cases.CHAPTER_4] for noise in (cases.vibrating, cases.arma)
+        [noise_orders(which, seeds, noise=noise) for which in cases.CHAPTER_4]
+        for noise in (cases.vibrating, cases.arma)
     )
     page += chapter_4(thesis, of_the_model, figures)
     frontal, side = ratios(cases.frontal(), "frontal", FRONTAL, seeds), ratios(cases.side(), "side", SIDE, seeds)

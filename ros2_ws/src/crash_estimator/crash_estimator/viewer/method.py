@@ -30,7 +30,7 @@ def _place(block: ParameterBlock, name: str) -> int:
 
 
 def kind(name: str) -> str:
-    """"weight" of "model0.weight", "ar" of "car.ar1"."""
+    """ "weight" of "model0.weight", "ar" of "car.ar1"."""
     return name.rpartition(".")[2].rstrip("0123456789")
 
 

@@ -55,7 +55,9 @@ class CompiledEstimator:
         last_row[self.columns["state"]] = ElementState.APART
         return CompiledState(memory, last_row)
 
-    def follow(self, state: CompiledState, times_ns: np.ndarray, values: np.ndarray) -> tuple[CompiledState, np.ndarray]:
+    def follow(
+        self, state: CompiledState, times_ns: np.ndarray, values: np.ndarray
+    ) -> tuple[CompiledState, np.ndarray]:
         """Fold a block of samples in -> the new state and one row of output a sample; `state` is left as it was.
 
         times_ns (k,) int64 ns since the impact; values (k, channels) SI. Rows (k, ...) hold `columns`.
@@ -108,7 +110,9 @@ class CompiledEstimator:
         found = []
         for k in np.flatnonzero(row[columns["state"]] != before[columns["state"]]):
             kind, crush = ElementState(int(row[columns["state"]][k])).name.lower(), float(row[columns["crush"]][k])
-            found.append(Event(kind, names.elements[k], crush, f"{names.elements[k]}: {kind} at crush {crush * 1e3:.1f} mm"))
+            found.append(
+                Event(kind, names.elements[k], crush, f"{names.elements[k]}: {kind} at crush {crush * 1e3:.1f} mm")
+            )
         passes = int(row[columns["rewinds"]][0])
         if passes:
             m = self.size.window
@@ -116,7 +120,9 @@ class CompiledEstimator:
         clamped, was = (r[columns["status"]] == ParameterStatus.CLAMPED for r in (row, before))
         for k in np.flatnonzero(clamped & ~was):
             value = float(row[columns["parameters"]][k])
-            found.append(Event("clamped", names.parameters[k], value, f"{names.parameters[k]}: held at its bound {value:g}"))
+            found.append(
+                Event("clamped", names.parameters[k], value, f"{names.parameters[k]}: held at its bound {value:g}")
+            )
         missing, was = (np.isnan(r[columns["measured"]]) for r in (row, before))
         for k in np.flatnonzero(missing & ~was):
             text = f"{names.equations[k]}: no valid measurement, its equation is left out"

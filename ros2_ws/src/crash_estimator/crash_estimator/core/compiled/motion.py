@@ -10,6 +10,7 @@ from ..regression import QUIETEST, SHORTEST_CRUSH
 
 LOADING, UNLOADING, APART = (float(state) for state in ElementState)
 
+
 @njit(cache=True, inline="always")
 def move(plan, s, row, time_ns, raw, values, bodies_now):
     """Integrate the bodies' motion and the elements' crush by one sample -> dt in s (0 before the impact).

@@ -17,7 +17,7 @@ class Plan(NamedTuple):
     """Who is measured by what, and who pushes whom. c channels, b bodies, e elements, q equations;
     all parameters for those of the model, p for those that are estimated. The whole numbers come first."""
 
-    first_channel: np.ndarray  # (b + 1,) accelerometers of body k: body_channels[first_channel[k] : first_channel[k + 1]]
+    first_channel: np.ndarray  # (b + 1,) of body k: body_channels[first_channel[k] : first_channel[k + 1]]
     has_offset: np.ndarray  # (c,) 1: yes
     ends: np.ndarray  # (e, 2)
     crush_channel: np.ndarray  # (e,) -1: integrated

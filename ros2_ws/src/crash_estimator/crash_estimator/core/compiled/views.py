@@ -78,7 +78,10 @@ def state_views(s, n):
     c, b, e, q, m = n.channels, n.bodies, n.elements, n.equations, n.window
     p = n.estimated
     w = n.estimated + n.offsets
-    k = cuts((2, c, c, b, q, b, b, b, e, e, e, e, e, w, w * w, q, p * p, p * p, q * q, 1, m * q * p, m * q, m * q, m * p, m, m * q, m * p * q, m * q))
+    k = cuts((
+        2, c, c, b, q, b, b, b, e, e, e, e, e, w, w * w, q, p * p, p * p, q * q, 1,
+        m * q * p, m * q, m * q, m * p, m, m * q, m * p * q, m * q,
+    ))  # fmt: skip
     return StateViews(
         s[k[0] : k[1]],  # clock
         s[k[1] : k[2]],  # count

@@ -1,4 +1,4 @@
-"""`python -m crash_estimator.core.compiled.warm_up`: compile the recursion into the cache, so that no one waits for it."""
+"""`python -m crash_estimator.core.compiled.warm_up`: compile the recursion into the cache: no one waits for it."""
 
 import numpy as np
 

@@ -71,7 +71,7 @@ class Afmm:
                 raise ModelError(f"{name} must be between 0 and 1, got {getattr(self, name):g} (setting of afmm)")
 
     def extra_names(self, equations: tuple[str, ...]) -> dict[str, str]:
-        """Name -> unit of `Update.extra`: weight and time of the last jump, the likeliest model first; jump NaN: none."""
+        """Name -> unit of `Update.extra`: weight and time of the last jump, likeliest model first; jump NaN: none."""
         return {f"model{k}.{what}": unit for k in range(self.models) for what, unit in (("weight", "1"), ("jump", "s"))}
 
     def init(self, equations: int) -> AfmmState:

@@ -85,7 +85,9 @@ class GaussNewton:
                         f"order {name} of gauss_newton must be a whole number from 0 to {LONGEST}, got {order!r}"
                     )
         if not isinstance(self.start, tuple):
-            raise ModelError(f"start of gauss_newton is a tuple of noise models, one for each equation, got {self.start!r}")
+            raise ModelError(
+                f"start of gauss_newton is a tuple of noise models, one for each equation, got {self.start!r}"
+            )
 
     def orders(self, equations: int) -> list[tuple[int, int]]:
         """(p, q) of each equation."""
@@ -98,7 +100,10 @@ class GaussNewton:
         """Name -> unit of `Update.extra`: the coefficients d ("ar") and a ("ma") of each equation."""
         named = zip(equations, self.orders(len(equations)))
         return {
-            f"{name}.{kind}{i + 1}": "1" for name, (p, q) in named for kind, n in (("ar", p), ("ma", q)) for i in range(n)
+            f"{name}.{kind}{i + 1}": "1"
+            for name, (p, q) in named
+            for kind, n in (("ar", p), ("ma", q))
+            for i in range(n)
         }
 
     def init(self, equations: int) -> GaussNewtonState:
@@ -107,7 +112,9 @@ class GaussNewton:
         if not self.start:
             return GaussNewtonState(rls, (), np.array(without))
         if [(len(model.d), len(model.a)) for model in self.start] != self.orders(equations):
-            raise ModelError(f"start of gauss_newton must be one noise model of orders p, q for each of {equations} equations")
+            raise ModelError(
+                f"start of gauss_newton must be one noise model of orders p, q for each of {equations} equations"
+            )
         return GaussNewtonState(self._begun(rls), (), np.full(equations, True))
 
     def _begun(self, rls: RlsState) -> RlsState:

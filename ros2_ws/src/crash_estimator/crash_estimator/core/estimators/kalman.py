@@ -47,7 +47,9 @@ class Kalman:
     offsets: bool = True  # estimate the errors of the zero offsets with theta
 
     def init(self, equations: int) -> KalmanState:
-        return KalmanState(self.settings.initial, np.diag(self.settings.std**2), np.zeros(0), np.full(equations, np.nan))
+        return KalmanState(
+            self.settings.initial, np.diag(self.settings.std**2), np.zeros(0), np.full(equations, np.nan)
+        )
 
     def update(self, state: KalmanState, regression: Regression) -> tuple[KalmanState, Update]:
         theta, noise, p = state.theta, self._noise(state, regression), len(state.theta)

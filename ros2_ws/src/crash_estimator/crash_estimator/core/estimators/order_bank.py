@@ -71,7 +71,9 @@ class OrderBank:
         events = updates[chosen].events
         if chosen != state.chosen:
             events += (Event("orders", "noise model", float(10 * p + q), f"noise model: p {p}, q {q}"),)
-        return state._replace(chosen=chosen), updates[chosen]._replace(extra=(float(p), float(q)), extra_std=(), events=events)
+        return state._replace(chosen=chosen), updates[chosen]._replace(
+            extra=(float(p), float(q)), extra_std=(), events=events
+        )
 
     def criteria(self, state: OrderBankState) -> np.ndarray:
         """(members, q) the criterion of each member for each equation; smaller is better."""

@@ -33,7 +33,7 @@ from ..regression import Regression
 from .update import Theta, Update, within_bounds
 
 NOISE_FLOOR = 0.1
-"""Share of the known noise variance below which Lambda must not fall: it is the mean of few E E', so nearly singular."""
+"""Share of the known noise variance below which Lambda must not fall: it is the mean of few E E': nearly singular."""
 
 
 class RlsState(NamedTuple):
@@ -106,7 +106,9 @@ class Rls:
         target = regression.measured - regression.known
         error = target - regression.gradient @ state.theta
         known_error = np.nan_to_num(error)
-        error_covariance = state.error_covariance + gamma * (np.outer(known_error, known_error) - state.error_covariance)
+        error_covariance = state.error_covariance + gamma * (
+            np.outer(known_error, known_error) - state.error_covariance
+        )
         valid = ~np.isnan(error)
         weight = np.zeros_like(error_covariance)
         floor = NOISE_FLOOR * np.diag(np.nan_to_num(regression.noise, nan=0.0))
@@ -122,7 +124,9 @@ class Rls:
             index = np.flatnonzero(active)
             residual = np.nan_to_num(target - regression.gradient @ theta)
             pull = (regression.gradient.T @ weight)[index]
-            both = multiplier * np.linalg.solve(information[np.ix_(index, index)], np.column_stack([pull @ residual, pull]))
+            both = multiplier * np.linalg.solve(
+                information[np.ix_(index, index)], np.column_stack([pull @ residual, pull])
+            )
             step, gain[:], gain[index] = both[:, 0], 0.0, both[:, 1:]
             if multiplier != 1.0:
                 limit = self.step_limit * self.settings.scale[index]
@@ -202,7 +206,7 @@ class Rls:
         return self.m * (share * error) ** 2 + (1.0 - share) * state.residual_variance
 
     def _learn_residual(self, state: RlsState, regression: Regression, error: np.ndarray) -> RlsState:
-        """E[error before times error after] = r, as the gain is about optimal; the square of either is more, or less."""
+        """E[error before times error after] = r, as the gain is about optimal; either's square is more, or less."""
         residual = regression.measured - regression.known - regression.gradient @ state.theta
         share = regression.dt / (regression.dt + 4.0 * self.memory)
         squared = np.where(np.isnan(residual), state.residual_variance, np.maximum(error * residual, 0.0))

@@ -173,7 +173,5 @@ def _distorted(specimen: Specimen, channel: str, distortion) -> Specimen:
 
 def _with(specimen: Specimen, bodies=(), elements=(), sensors=()) -> Specimen:
     old = specimen.scenario
-    system = replace(
-        old.system, bodies=(*old.system.bodies, *bodies), elements=(*old.system.elements, *elements)
-    )
+    system = replace(old.system, bodies=(*old.system.bodies, *bodies), elements=(*old.system.elements, *elements))
     return replace(specimen, scenario=replace(old, system=system, sensors=(*old.sensors, *sensors)))
