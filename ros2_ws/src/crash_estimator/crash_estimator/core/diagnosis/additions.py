@@ -1,14 +1,13 @@
 """Effects of a model file as additions of a fit, and back."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ..effects.base import AttachedBody, Effect, StaticFactor
 from ..effects.targets import checked
 from ..structure import EffectSpec, Structure
-from .answer import stated
+from .answer import StepReport
 from .layout import Addition
-from .model import Model
 from .scales import Scales
 
 
@@ -32,22 +31,13 @@ def _addition(structure: Structure, scales: Scales, spec: EffectSpec, effects: M
     return Addition(effect, spec.target, shapes, coefficient, host, spec.touches, spec.taken_from, spec.variant)
 
 
-def structure_with(structure: Structure, model: Model, present: int) -> Structure:
-    """The structure with the effects that a search has added, as found."""
-    added = []
-    for addition in model.additions[present:]:
-        place = next(p for p in model.fit.layout.places if p.addition.key == addition.key)
-        value, _, shapes = stated(place, model.fit)
-        added.append(
-            EffectSpec(
-                addition.effect.name,
-                addition.target,
-                value,
-                shapes,
-                addition.host,
-                addition.touches,
-                addition.taken_from,
-                addition.variant,
-            )  # fmt: skip
+def structure_with(structure: Structure, added: Sequence[Addition], steps: Sequence[StepReport]) -> Structure:
+    """The structure with the effects that a search has added, with the coefficients that the answer states."""
+    effects = [
+        EffectSpec(
+            addition.effect.name, addition.target, step.coefficient, step.shape, addition.host, addition.touches,
+            addition.taken_from, addition.variant,
         )
-    return replace(structure, effects=(*structure.effects, *added))
+        for addition, step in zip(added, steps, strict=True)
+    ]  # fmt: skip
+    return replace(structure, effects=(*structure.effects, *effects))

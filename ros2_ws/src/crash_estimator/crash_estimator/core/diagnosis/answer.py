@@ -10,7 +10,7 @@ from crash_replay.conditioning import cfc_filter
 from ..effects.base import StaticFactor
 from .assess import Left, assess, noise_floor
 from .fit import Fit
-from .layout import Layout, Place
+from .layout import Addition, Layout, Place
 from .linearise import balance_of
 from .model import Model
 from .records import Record
@@ -96,8 +96,8 @@ def stated(place: Place, fitted: Fit) -> tuple[float, float, dict[str, float]]:
     return value(at), float(abs(value(at)) * factor), shapes
 
 
-def place_of(layout: Layout, tried: Tried) -> Place:
-    return next(place for place in layout.places if place.addition.key == tried.addition.key)
+def place_of(layout: Layout, addition: Addition) -> Place:
+    return next(place for place in layout.places if place.addition.key == addition.key)
 
 
 def ranking_of(round_: Round, recordings: int) -> tuple[Ranked, ...]:
@@ -122,28 +122,34 @@ def _ranked(tried: Tried, round_: Round, shown: list[Tried]) -> Ranked:
     else:
         left = assess(tried.fit, round_.before.records)
         explained = float(np.clip(1.0 - left.cost / round_.before.left.cost, 0.0, 1.0))
-        value, std, shape = stated(place_of(tried.fit.layout, tried), tried.fit)
+        value, std, shape = stated(place_of(tried.fit.layout, tried.addition), tried.fit)
     return Ranked(
         effect, target, value, std, tried.addition.effect.unit, float(tried.gain), explained, not rivals, rivals, shape,
         tried.fit is not None,
     )  # fmt: skip
 
 
+def fit_stated(round_: Round, final: Model) -> Fit:
+    """The fit that a step's coefficient is stated from; final: the model with all that was added."""
+    # the last model knows best; but where the noise had to be taken larger, it is the round's own fit that is honest
+    tempered = final.records[0].mix is not None and round_.before.records[0].mix is not None
+    return round_.tried[0].fit if tempered else final.fit
+
+
 def step_of(round_: Round, before: Model, after: Model, free_run: tuple[float, float], final: Model) -> StepReport:
     """free_run: RMS of the two models' free runs; final: the model with all that was added."""
     tried = round_.tried[0]
-    # the last model knows best; but where the noise had to be taken larger, it is the round's own fit that is honest
-    tempered = final.records[0].mix is not None and round_.before.records[0].mix is not None
-    fitted = tried.fit if tempered else final.fit
-    value, std, shape = stated(place_of(fitted.layout, tried), fitted)
+    fitted = fit_stated(round_, final)
+    value, std, shape = stated(place_of(fitted.layout, tried.addition), fitted)
     floor = noise_floor(before.fit.layout, before.records)
+    changed = after.fit if fitted is final.fit else fitted
     return StepReport(
         *tried.addition.key, value, std, tried.addition.effect.unit, float(tried.gain),
         explained=float(np.clip(1.0 - after.left.cost / before.left.cost, 0.0, 1.0)),
         shape=shape,
         residual_rms={"before": before.left.rms, "after": after.left.rms, "noise_floor": floor, "unit": "m/s^2"},
         free_run_rms={"before": free_run[0], "after": free_run[1]},
-        force_explained=_force_explained(round_.before.fit, fitted if tempered else after.fit, before.records),
+        force_explained=_force_explained(round_.before.fit, changed, before.records),
     )  # fmt: skip
 
 
@@ -173,4 +179,4 @@ def _balance(fitted: Fit, record: Record, row: int, period: float) -> float:
     return max(float(1.0 - np.var(left[acts]) / np.var(force[acts])), 0.0)
 
 
-__all__ = ["Left", "Ranked", "StepReport", "ranking_of", "stated", "step_of"]
+__all__ = ["Left", "Ranked", "StepReport", "fit_stated", "place_of", "ranking_of", "stated", "step_of"]

@@ -14,6 +14,7 @@ from .answer import Ranked, StepReport, ranking_of, step_of
 from .assess import assess, free_run, noise_floor
 from .constancy import Drift, drift_of
 from .fit import Fit, fit
+from .helpful import helpful
 from .misfit import MisfitWindow, misfit_windows
 from .model import Model, fit_model
 from .records import Record, make_record
@@ -134,6 +135,9 @@ def _found(
             if finer_final.left.whiteness.white:
                 scales, rounds, final = finer, finer_rounds, finer_final
                 as_recorded = _in_the_sensors_noise(final, records)
+    rounds, told = helpful(rounds, final, len(present))
+    if told is not final:
+        final, as_recorded = told, _in_the_sensors_noise(told, records)
     return _Found(scales, rounds, final, len(present), as_recorded)
 
 
@@ -168,7 +172,7 @@ def _answer(structure: Structure, found: _Found, drift: Drift) -> Diagnosis:
         remaining=ranking_of(rounds[-1], len(first.records)),
         misfit=misfit_windows(first.fit.layout, first.records, first.left),
         misfit_after=misfit_windows(final.fit.layout, final.records, final.left),
-        structure=structure_with(structure, final, present),
+        structure=structure_with(structure, added, steps),
         models=models,
     )
 

@@ -30,6 +30,8 @@ A force that jumps at separation is felt by the fit only while it jumps: blurred
 HOTTER = tuple(stage._replace(inflate=10.0 * stage.inflate) for stage in FADE)
 """Where that has led nowhere: less is believed at first, so that less is fitted to a motion that is still wrong."""
 
+HOTTEST = tuple(stage._replace(inflate=100.0 * stage.inflate) for stage in FADE)
+
 REFINE = (Stage(0.0, 2.0, 6.0), Stage(0.0, 1.0, 2.0))
 """Stages of a fit that starts from a simulation."""
 
@@ -222,7 +224,8 @@ def fit(
         if iteration >= most:
             break
     cost = step.after
-    if least is not None and cost > least[1].before:  # it went astray at a kink of the forces
+    if least is not None and not 0.0 <= cost <= least[1].before:
+        # it went astray at a kink of the forces; or so far that nothing but rounding is left of the cost
         (point, _, normal), cost = least, least[1].before
     cost += normal.grown
     try:

@@ -8,12 +8,15 @@ import numpy as np
 
 from ..effects.base import ChannelError, Effect
 from .assess import Left, assess
-from .fit import fit
-from .layout import Addition
+from .fit import REFINE, Fit, fit
+from .layout import Addition, Layout
 from .model import Model, fit_model
+from .motion import motion_of
 from .records import Record
 from .scales import Scales, make_scales
+from .screening import embedding
 from .temper import tempered
+from .trajectory import Trajectory
 from .trying import GAIN, Tried, try_candidates
 
 TEMPERINGS = 3
@@ -42,12 +45,37 @@ def one_round(records: Sequence[Record], scales: Scales, effects: Mapping[str, E
         left = assess(done.best.fit, done.before.records) if done.best else done.before.left
         noisier = tempered(records, bounded(left.residual, records))
         before = fit_model(scales.structure, noisier, scales, model.additions)
+        for start in [done.before.fit, *(one.fit for one in done.tried[:1] if one.fit)]:
+            further = fitted_on(before, start)
+            before = further if better(further, before) else before
         if before.left.whiteness.white:  # so it looks; the sensors' own noise decides
             there = fit(model.fit.layout, records, (before.fit.theta, before.fit.trajectories))
             decided = assess(there, records, sharply=True).whiteness
             before = before._replace(left=before.left._replace(whiteness=decided))
         done = Round(before, try_candidates(noisier, scales, effects, before), tried)
     return done
+
+
+def fitted_on(model: Model, start: Fit) -> Model:
+    """The model fitted from another fit, of it or of more: one that begins with the measured motion may go astray."""
+    found = fit(model.fit.layout, model.records, narrowed(model.fit.layout, start, model.records), refine=REFINE)
+    return model._replace(fit=found, left=assess(found, model.records, sharply=True))
+
+
+def narrowed(layout: Layout, wide: Fit, records: Sequence[Record]) -> tuple[np.ndarray, list[Trajectory]]:
+    """Parameters and motions of a fit of more additions, without those that the layout has not."""
+    theta = wide.theta[embedding(layout, wide.layout)]
+    along = enumerate(zip(records, wide.trajectories))
+    return theta, [motion_of(layout, record, r, theta, trajectory.a) for r, (record, trajectory) in along]
+
+
+def better(one: Model, other: Model) -> bool:
+    """Whether a fit of the same model in the same noise is a better one.
+
+    The evidence counts what a motion that has not settled would leave, to first order; of one that never settles, that
+    is less than it leaves itself. So both must say so.
+    """
+    return one.fit.evidence > other.fit.evidence + 1.0 and one.left.cost < other.left.cost
 
 
 def bounded(residuals: Sequence[np.ndarray], records: Sequence[Record]) -> list[np.ndarray]:

@@ -2,19 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from ..effects.base import Effect
 from .assess import assess
-from .fit import HOTTER, Fit, fit
-from .layout import Addition, Layout, make_layout
+from .fit import HOTTER, fit
+from .layout import Addition, make_layout
 from .model import Model, fit_model
-from .motion import motion_of
 from .records import Record
-from .rounds import Round, added, one_round, share_removed
+from .rounds import Round, added, better, narrowed, one_round, share_removed
 from .scales import Scales
-from .screening import embedding
-from .trajectory import Trajectory
 from .trying import GAIN, Tried
 from .two_at_once import two_at_once
 
@@ -58,7 +53,7 @@ def _one_by_one(
             # where the noise had to be taken larger, the model before the round is the one fitted with it
             return without_the_superseded(records, scales, rounds, done.before, present)
         fair = _without(scales, model, done.best)
-        if fair.fit.evidence > model.fit.evidence + 1.0 and done.before is model:
+        if done.before is model and better(fair, model):
             # the candidate's fit has shown a better one of the model without it
             model, rounds = fair, rounds[:-1]
             continue
@@ -93,17 +88,10 @@ def _refitted(scales: Scales, records: Sequence[Record], additions: Sequence[Add
     """Fitted with the other, larger model's hyperparameters, so that evidences compare; from where that one has ended,
     and, as it may have been led astray, from the measured motion."""
     layout = make_layout(scales.structure, records, scales, additions, like.roughness)
-    from_there = _narrowed(layout, like.fit, records)
+    from_there = narrowed(layout, like.fit, records)
     fits = (fit(layout, records, from_there), fit(layout, records), fit(layout, records, refine=HOTTER))
     found = max(fits, key=lambda one: one.evidence)
     return Model(tuple(additions), found, assess(found, records, sharply=True), like.roughness, records)
-
-
-def _narrowed(layout: Layout, wide: Fit, records: Sequence[Record]) -> tuple[np.ndarray, list[Trajectory]]:
-    """Parameters and motions of a fit of more additions, without those that the layout has not."""
-    theta = wide.theta[embedding(layout, wide.layout)]
-    along = enumerate(zip(records, wide.trajectories))
-    return theta, [motion_of(layout, record, r, theta, trajectory.a) for r, (record, trajectory) in along]
 
 
 def _round_again(round_: Round, before: Model, gain: float | None) -> Round:
@@ -114,6 +102,6 @@ def _round_again(round_: Round, before: Model, gain: float | None) -> Round:
 def _without(scales: Scales, model: Model, tried: Tried) -> Model:
     """The model refitted from where a candidate's fit has ended."""
     layout = model.fit.layout
-    theta, motions = _narrowed(layout, tried.fit, model.records)
+    theta, motions = narrowed(layout, tried.fit, model.records)
     found = fit(layout, model.records, (theta, motions))
     return model._replace(fit=found, left=assess(found, model.records, sharply=True))
