@@ -9,6 +9,7 @@ import rclpy
 import yaml
 from crash_msgs.msg import Misfit, Ranking, Residuals, Samples, TestInfo
 from helpers_domain import own_domain
+from helpers_other_process import OtherProcesses
 from helpers_waiting import PATIENCE
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -44,7 +45,8 @@ class Stage:
     """A replay's stand-in and listener, with diagnosis nodes."""
 
     def __init__(self):
-        rclpy.init(domain_id=own_domain())
+        self.domain = own_domain()
+        rclpy.init(domain_id=self.domain)
         self.executor = EventsExecutor()
         self.node = Node("stage")
         self.executor.add_node(self.node)
@@ -52,11 +54,13 @@ class Stage:
         self.samples = self.node.create_publisher(Samples, "samples", STREAM)
         self.diagnoses: list[DiagnosisNode] = []
         self.heard: dict[str, dict[str, list]] = {}
+        self.others = OtherProcesses(self.domain)
 
     def close(self) -> None:
         self.executor.shutdown()
         for node in (*self.diagnoses, self.node):
             node.destroy_node()
+        self.others.close()
         rclpy.shutdown()
 
     def add_diagnosis(self, name: str = "diagnosis", **parameters) -> None:

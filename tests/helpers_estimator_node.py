@@ -12,6 +12,7 @@ import numpy as np
 import rclpy
 from crash_msgs.msg import EstimatorState, Event, Forces, Parameters, ReplayState, Residuals, Samples, TestInfo
 from helpers_domain import own_domain
+from helpers_other_process import OtherProcesses
 from helpers_waiting import PATIENCE
 from numpy.testing import assert_array_equal
 from rclpy.experimental.events_executor import EventsExecutor
@@ -59,25 +60,17 @@ class Stage:
         self.heard: dict[str, dict[str, list]] = {}
         self.processes: list[subprocess.Popen] = []
         self.replayed: list[ReplayState] = []
-        self.others: list[Node] = []
+        self.others = OtherProcesses(self.domain)
 
     def close(self) -> None:
         for process in self.processes:
             process.terminate()
             process.wait(60)
         self.executor.shutdown()
-        for node in (*self.estimators, self.node, *self.others):
+        for node in (*self.estimators, self.node):
             node.destroy_node()
-        for node in self.others:
-            rclpy.shutdown(context=node.context)
+        self.others.close()
         rclpy.shutdown()
-
-    def other(self, name: str) -> Node:
-        """A node that only publishes, of another process for all that the middleware knows."""
-        context = rclpy.Context()
-        rclpy.init(context=context, domain_id=self.domain)
-        self.others.append(Node(name, context=context))
-        return self.others[-1]
 
     def add_estimator(self, name: str = "estimator", **parameters) -> EstimatorNode:
         overrides = [Parameter(key, value=value) for key, value in parameters.items()]

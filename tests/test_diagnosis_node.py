@@ -241,8 +241,8 @@ def test_rosbag2s_player_feeds_it_too(stage, case):
     recording, finals = case[2], len(stage.finals())
     stage.send_test(recording)
     stage.node.destroy_publisher(stage.samples)
-    channels = recording.test.channels
-    out = [stage.node.create_publisher(channel_type(c), f"channels/{c.name}", STREAM) for c in channels]
+    channels, player = recording.test.channels, stage.others.add("player")
+    out = [player.create_publisher(channel_type(c), f"channels/{c.name}", STREAM) for c in channels]
     stage.spin_until(lambda: all(p.get_subscription_count() == 2 for p in out), "the channels are subscribed to")
     for time_ns, values in zip(recording.time_ns.tolist(), recording.values.tolist()):
         for publisher, channel, value in zip(out, channels, values):

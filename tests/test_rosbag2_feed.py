@@ -43,7 +43,7 @@ class Player:
             channels = reader.get_summary().channels.values()
             schemas = reader.get_summary().schemas
             self.messages = [(channel.topic, message.data) for _, channel, message in reader.iter_messages()]
-        node = stage.other("player")
+        node = stage.others.add("player")
         self.publishers = {
             c.topic: node.create_publisher(
                 TYPES[schemas[c.schema_id].name],
@@ -137,7 +137,7 @@ def test_the_channels_of_a_replay_that_ends_are_not_listened_to(stage):
     Who listened to them from then on would hear the next replay twice, until that is found out.
     """
     stage.add_estimator(model=MODEL, method="mrls")
-    replay = stage.other("replay")
+    replay = stage.others.add("replay")
     samples = replay.create_publisher(crash_msgs.msg.Samples, "samples", STREAM)
     stage.node.destroy_publisher(stage.samples)
     stage.spin_until(lambda: samples.get_subscription_count(), "the replay's samples are listened to")
