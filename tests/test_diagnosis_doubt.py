@@ -17,7 +17,8 @@ from crash_replay.bag import read_bag
 
 BAGS = Path(__file__).parents[1] / "bags"
 HIDDEN = str(BAGS / "hidden_effect.model.yaml")
-ADVICE = "check bodies, masses and attachments"
+ADVICE = "check its bodies, masses and attachments, and units, signs and initial velocities"
+RESTS = "rib 0, pelvis 0, spine 0 m/s"
 
 
 @cache
@@ -41,14 +42,15 @@ def test_a_model_that_explains_little_and_is_not_mended_is_doubted_below_the_ver
         command.main()
     said = capsys.readouterr().out.splitlines()
     assert status.value.code == 0 and said[0].startswith("unexplained")
-    assert said[1:3] == [f"the model itself may be wrong (as given it explains 0% of car_ax): {ADVICE}", ""]
+    why = "as given it explains 0% of car_ax"
+    assert said[1:3] == [f"the model itself or the recording may be wrong ({why}): {ADVICE} (car 13.3 m/s)", ""]
 
 
 def test_a_stack_of_effects_is_doubted_though_they_leave_only_noise():
     one = found("hidden_effect", HIDDEN)
     assert doubt(replace(one, steps=one.steps * 2)) == ""
     assert doubt(replace(one, steps=one.steps * 3)) == (
-        f"the model itself may be wrong (it takes 3 effects to mend it): {ADVICE}"
+        f"the model itself or the recording may be wrong (it takes 3 effects to mend it): {ADVICE} ({RESTS})"
     )
 
 
@@ -69,4 +71,4 @@ def test_an_effect_as_large_as_is_admitted_is_doubted(sign):
 
     assert limited(1.1) == ""
     reason = "coulomb_friction on rib_spine is as large as it may be"
-    assert limited(1.0) == f"the model itself may be wrong ({reason}): {ADVICE}"
+    assert limited(1.0) == f"the model itself or the recording may be wrong ({reason}): {ADVICE} ({RESTS})"

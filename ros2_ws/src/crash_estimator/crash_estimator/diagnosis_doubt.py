@@ -1,7 +1,7 @@
 """When what was found should not be believed before the model itself has been checked: one sentence.
 
-A structure that is wrong in its bodies, masses or attachments still gets an answer, as the effects of the vocabulary
-are bent to do its work. What gives it away: as given it leaves most of what a channel measures, and no effect mends
+A structure that is wrong in its bodies, masses or attachments, or a recording that is in its units, signs or initial
+velocities, still gets an answer, as the effects of the vocabulary are bent to do its work. What gives it away: as given it leaves most of what a channel measures, and no effect mends
 that; or effects are stacked; or one of them is as large as it may be.
 """
 
@@ -23,7 +23,7 @@ AT_LIMIT = 0.999
 
 
 def doubt(found: Diagnosis) -> str:
-    """One sentence where the model itself may be wrong, else nothing."""
+    """One sentence where the model itself, or what the recording states, may be wrong, else nothing."""
     if found.verdict == "adequate":
         return ""
     reasons = []
@@ -33,7 +33,16 @@ def doubt(found: Diagnosis) -> str:
     if len(found.steps) >= STACK:
         reasons.append(f"it takes {len(found.steps)} effects to mend it")
     reasons += [f"{name} is as large as it may be" for name in at_limit(found)]
-    return f"the model itself may be wrong ({', '.join(reasons)}): check bodies, masses and attachments" * bool(reasons)
+    if not reasons:
+        return ""
+    check = f"check its bodies, masses and attachments, and units, signs and initial velocities ({starts(found)})"
+    return f"the model itself or the recording may be wrong ({', '.join(reasons)}): {check}"
+
+
+def starts(found: Diagnosis) -> str:
+    """How fast the free bodies start in the first recording: one forgotten, or the wrong way, is easily seen."""
+    given = found.models[0].records[0].test.initial_velocity
+    return ", ".join(f"{b.name} {given.get(b.name, 0.0):.4g}" for b in found.structure.bodies if b.free) + " m/s"
 
 
 def worst_explained(model: Model) -> tuple[str, float]:
