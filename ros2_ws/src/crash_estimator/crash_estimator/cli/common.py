@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from crash_replay.recording import RecordingError
+from crash_replay.bag import read_bag
+from crash_replay.recording import Recording, RecordingError
 
 from ..core.effects import EFFECTS
 from ..core.effects.base import Effect
@@ -28,6 +29,17 @@ def guarded(command: Callable[[], int | None]) -> int:
         return 1
     except KeyboardInterrupt:
         return 130
+
+
+def read_crash(bag: str) -> Recording:
+    """A bag with something of a crash in it; raises RecordingError where it ends before the impact."""
+    recording = read_bag(bag)
+    if not recording.time_ns[-1] >= 0:
+        end = recording.time_ns[-1] * 1e-6
+        raise RecordingError(
+            f"{bag}: its last sample is {-end:.4g} ms before the impact (time zero): there is nothing to learn from"
+        )
+    return recording
 
 
 def add_effects_option(parser: argparse.ArgumentParser) -> None:

@@ -5,7 +5,6 @@ import sys
 
 import numpy as np
 
-from crash_replay.bag import read_bag
 from crash_replay.recording import Recording
 
 from ..core.errors import EquationError, equation_errors
@@ -14,7 +13,7 @@ from ..core.fold import run
 from ..core.methods import METHODS, make_estimator
 from ..model_file import load_model, ready_models
 from ..tables import besides_table, error_table, known_effects_table, parameter_table
-from .common import add_effects_option, effects_of, guarded, parse_settings, write_json
+from .common import add_effects_option, effects_of, guarded, parse_settings, read_crash, write_json
 
 
 def main() -> None:
@@ -36,7 +35,7 @@ def main() -> None:
 
 def estimate(arguments: argparse.Namespace) -> None:
     structure = load_model(arguments.model)
-    recording = read_bag(arguments.bag)
+    recording = read_crash(arguments.bag)
     settings = parse_settings(arguments.set) | ({"effective_mass": True} if arguments.effective_mass else {})
     effects = effects_of(arguments)
     estimator = make_estimator(structure, recording.test, arguments.method, effects=effects, **settings)

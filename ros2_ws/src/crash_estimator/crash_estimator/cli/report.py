@@ -6,14 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from crash_replay.bag import read_bag
 from crash_replay.conditioning import CFC_CLASSES
 
 from ..core.methods import METHODS
 from ..core.structure import ModelError
 from ..model_file import load_model, ready_models
 from ..report_page import write_report
-from .common import add_effects_option, effects_of, guarded
+from .common import add_effects_option, effects_of, guarded, read_crash
 from .simulate import smoother
 
 SHOWN = ["rls", "mrls", "constrained_kalman"]
@@ -37,7 +36,7 @@ def main() -> None:
 
 def report(arguments: argparse.Namespace) -> None:
     structure = load_model(arguments.model)
-    recording = read_bag(arguments.bag)
+    recording = read_crash(arguments.bag)
     folder = Path(arguments.to)
     if folder.exists() and not folder.is_dir():
         raise ModelError(f"{folder} is a file: --to takes a folder")

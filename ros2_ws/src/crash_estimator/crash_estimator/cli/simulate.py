@@ -22,7 +22,7 @@ from ..core.structure import ModelError, Structure
 from ..model_file import load_model, ready_models
 from ..tables import table
 from ..validation_tables import comparison_table
-from .common import add_effects_option, effects_of, guarded, parse_settings, write_json
+from .common import add_effects_option, effects_of, guarded, parse_settings, read_crash, write_json
 
 FILTER = 60
 """CFC of signals that are rated, unless told otherwise: that of a vehicle structure's acceleration (SAE J211-1)."""
@@ -50,7 +50,7 @@ def main() -> None:
 def simulate(arguments: argparse.Namespace) -> None:
     model, effects = load_model(arguments.model), effects_of(arguments)
     settings = parse_settings(arguments.set) | {"effects": effects}
-    recording = read_bag(arguments.bag)
+    recording = read_crash(arguments.bag)
     if not arguments.end > 0.0:
         raise ModelError(f"--end must be a time after the impact, above 0 s, got {arguments.end:g}")
     estimator = make_estimator(model, recording.test, arguments.method, **settings)
