@@ -174,6 +174,20 @@ def test_a_command_ends_the_waiting(playing):
     assert pacing.player.mode == Mode.PAUSED  # the command stands
 
 
+def test_a_command_does_not_let_samples_overtake_the_test():
+    """Whoever gets samples before the test they are of cannot do anything with them; but nobody is waited for long."""
+    pacing = pacing_of()
+    pacing.outlet.arrived = False
+    Timer(0.1, lambda: setattr(pacing.outlet, "arrived", True)).start()
+    pacing.command(Player.resume)
+    pacing.wait_for_subscribers(2, 1000.0)
+    assert pacing.outlet.arrived
+    pacing.outlet.arrived = False
+    begin = time.monotonic()
+    pacing.wait_for_subscribers(2, 1000.0)
+    assert time.monotonic() - begin < 5.0
+
+
 def test_a_signal_ends_it_between_two_messages():
     pacing = pacing_of(rate=0.01)  # 0.1 s from sample to sample
     pacing.start()

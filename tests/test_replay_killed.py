@@ -53,6 +53,21 @@ def test_one_that_is_killed_is_named_while_the_replay_waits_for_its_lease_to_end
     assert "what was sent is not taken: waiting for /mortal, which was killed (" in said[0]
 
 
+def test_one_that_is_killed_counts_for_none_that_is_still_to_come(bag, listener):
+    mortal = subprocess.Popen([sys.executable, "-c", MORTAL], env=environment())
+    try:
+        with Replay(bag, wait_for=3, progress=False):
+            wait_until(lambda: listener.states and listener.states[-1].subscribers == 2)
+            mortal.kill()
+            mortal.wait()
+            wait_until(lambda: listener.states[-1].subscribers == 1)
+            there = listener.node.get_subscriptions_info_by_topic("samples")
+            assert "mortal" in [endpoint.node_name for endpoint in there], "the middleware lists it until its lease ends"
+    finally:
+        mortal.kill()
+        mortal.wait()
+
+
 def test_whether_a_process_is_gone_is_known_of_this_machine_only():
     """Participants as Fast DDS numbers them: its maker, the machine, the process, and which one in it."""
 

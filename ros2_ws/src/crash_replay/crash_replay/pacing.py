@@ -72,7 +72,7 @@ class Pacing:
         return f"{sent} samples sent{rest}, the next is sample {player.next}", sent
 
     def wait_for_subscribers(self, wanted: int, timeout: float) -> None:
-        """Wait until `wanted` subscribers listen and have the test, or a command comes; raises SubscribersMissing."""
+        """Wait until `wanted` subscribers listen, or a command comes, and have the test; raises SubscribersMissing."""
         limit = time.perf_counter() + (timeout if wanted else DISCOVERY)
         while self._waits() and not 0 < wanted <= self.outlet.subscribers():
             if time.perf_counter() > limit:
@@ -82,8 +82,8 @@ class Pacing:
             self._send_state_if_due()
             time.sleep(0.005)
         limit = time.perf_counter() + DISCOVERY
-        while self._waits() and not self.outlet.test_has_arrived() and time.perf_counter() < limit:
-            time.sleep(0.001)
+        while not (self.stopped or self.outlet.test_has_arrived()) and time.perf_counter() < limit:
+            time.sleep(0.001)  # whatever command has come: samples without their test are lost on whom they reach
 
     def start(self, paused: bool = False, delay: float = 0.0) -> None:
         """After `delay` s play from the first sample, or wait for commands; where one has come already, it stands."""

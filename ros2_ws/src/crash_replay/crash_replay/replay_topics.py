@@ -10,11 +10,11 @@ from rosgraph_msgs.msg import Clock
 
 from .flow import NOT_WAITING, Flow
 from .lockstep import Answered, Listeners, Lockstep
-from .player import SECOND, Batch, Player, Tally
+from .player import SECOND, Batch, Mode, Player, Tally
 from .qos import LATCHED, SAID, STREAM
 from .recording import Recording
 from .ros_messages import channel_to_msg, channel_type, samples_to_msg, stamp, test_to_msg, time_zero_ns
-from .subscribers import UNNAMED, node_name, process_of, waited_for
+from .subscribers import UNNAMED, killed, node_name, process_of, waited_for
 
 OVERRIDABLE = QoSOverridingOptions.with_default_policies()
 
@@ -83,7 +83,8 @@ class ReplayTopics:
         self.lockstep.answer(message.node, Answered(message.run, message.number, message.missed))
 
     def subscribers(self) -> int:
-        return self.samples.get_subscription_count()
+        """On `samples`, but of killed ones: one that the middleware has yet to forget stands for none still to come."""
+        return max(0, self.samples.get_subscription_count() - len(killed(self.node, self.samples.topic_name)))
 
     def subscriber_names(self) -> list[str]:
         """Nodes that listen to `samples`."""
@@ -133,7 +134,8 @@ class ReplayTopics:
             total=len(self.recording),
             sent=tally.samples,
             acknowledged=self.acknowledged,
-            subscribers=self.subscribers(),
+            # who was killed is looked for only where there is time for it
+            subscribers=self.subscribers() if player.mode == Mode.WAITING else self.samples.get_subscription_count(),
             time=self.last_time_ns / SECOND,
             rate_asked=player.rate,
             rate_actual=tally.rate,

@@ -29,14 +29,22 @@ def waited_for(node: Node, publishers: Sequence[Publisher]) -> str:
     """Those who may owe the node's publishers an acknowledgement; of these the killed ones, where there are any."""
     topics = {publisher.topic_name for publisher in publishers}
     listening = [e for topic in topics for e in node.get_subscriptions_info_by_topic(topic)]
-    reliable = [e for e in listening if e.qos_profile.reliability == ReliabilityPolicy.RELIABLE]
-    own = [process_of(e) for topic in topics for e in node.get_publishers_info_by_topic(topic)]
-    processes = running()
-    killed = sorted({_said(e) for e in reliable if is_gone(process_of(e), own, processes)})
-    if killed:
-        return f"{', '.join(killed)}, which was killed (the middleware forgets it within some seconds)"
-    names = sorted({_said(e) for e in reliable})
+    gone = sorted({_said(e) for topic in topics for e in killed(node, topic) if _acknowledges(e)})
+    if gone:
+        return f"{', '.join(gone)}, which was killed (the middleware forgets it within some seconds)"
+    names = sorted({_said(e) for e in listening if _acknowledges(e)})
     return names[0] if len(names) == 1 else f"one of {', '.join(names) or 'those that have just gone'}"
+
+
+def killed(node: Node, topic: str) -> list[TopicEndpointInfo]:
+    """Subscriptions on a topic of the node's that the middleware has yet to forget: their processes run no more."""
+    own = [process_of(e) for e in node.get_publishers_info_by_topic(topic)]
+    processes = running()
+    return [e for e in node.get_subscriptions_info_by_topic(topic) if is_gone(process_of(e), own, processes)]
+
+
+def _acknowledges(endpoint: TopicEndpointInfo) -> bool:
+    return endpoint.qos_profile.reliability == ReliabilityPolicy.RELIABLE
 
 
 def _said(endpoint: TopicEndpointInfo) -> str:
