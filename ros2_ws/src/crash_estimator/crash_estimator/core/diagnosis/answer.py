@@ -13,6 +13,7 @@ from .fit import Fit
 from .layout import Addition, Layout, Place
 from .linearise import balance_of
 from .model import Model
+from .prior_odds import against_a_mass
 from .records import Record
 from .rounds import Round
 from .temper import CFC, SLOWEST
@@ -109,7 +110,7 @@ def ranking_of(round_: Round, recordings: int) -> tuple[Ranked, ...]:
 def _ranked(tried: Tried, round_: Round, shown: list[Tried]) -> Ranked:
     effect, target = tried.addition.key
     fitted = [other for other in shown if other is not tried and other.fit] if tried.fit and tried.gain > GAIN else []
-    rivals = tuple(" on ".join(other.addition.key) for other in fitted if abs(other.gain - tried.gain) < CONFOUNDED)
+    rivals = tuple(" on ".join(other.addition.key) for other in fitted if _confounded(tried, other))
     before = round_.before.fit.cost
     if tried.fit is None:
         explained = min(max(2.0 * tried.gain / before, 0.0), 1.0)
@@ -127,6 +128,12 @@ def _ranked(tried: Tried, round_: Round, shown: list[Tried]) -> Ranked:
         effect, target, value, std, tried.addition.effect.unit, float(tried.gain), explained, not rivals, rivals, shape,
         tried.fit is not None,
     )  # fmt: skip
+
+
+def _confounded(one: Tried, other: Tried) -> bool:
+    """Whether the recordings hardly tell two fitted candidates apart: with or without what is held against a mass."""
+    gains = [(t.gain, t.gain + against_a_mass(t.fit.layout.structure, t.addition)) for t in (one, other)]
+    return any(abs(a - b) < CONFOUNDED for a, b in zip(*gains))
 
 
 def fit_stated(round_: Round, final: Model) -> Fit:

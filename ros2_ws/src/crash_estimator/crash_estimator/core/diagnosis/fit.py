@@ -139,9 +139,12 @@ def advance(
     return motion_of(layout, record, r, theta + delta, trajectory.a + trace)
 
 
-def equation_error_start(layout: Layout, records: Sequence[Record]) -> tuple[np.ndarray, list[Trajectory]]:
-    """Parameters that fit the forces along the measured motion, and that motion."""
-    theta, trajectories, step = _along_the_measured(layout, records, FADE[0].inflate)
+def equation_error_start(
+    layout: Layout, records: Sequence[Record], held: Sequence[int] = ()
+) -> tuple[np.ndarray, list[Trajectory]]:
+    """Parameters that fit the forces along the measured motion, and that motion; held: those that stay as they
+    start."""
+    theta, trajectories, step = _along_the_measured(layout, records, FADE[0].inflate, held)
     return theta + step.delta, trajectories
 
 
@@ -179,16 +182,16 @@ class _Point(NamedTuple):
 
 def fit(
     layout: Layout, records: Sequence[Record], start: tuple[np.ndarray, Sequence[Trajectory]] | None = None,
-    hopeless: float = np.inf, most: int = MOST_ITERATIONS, refine: Sequence[Stage] = (),
+    hopeless: float = np.inf, most: int = MOST_ITERATIONS, refine: Sequence[Stage] = (), held: Sequence[int] = (),
 ) -> Fit:  # fmt: skip
     """Fit from the measured motion, or from given parameters and trajectories.
 
     hopeless: cost above which, after LEAST iterations, it is not worth going on; refine: stages before the free run,
-    FADE where none are given and the fit starts from the measured motion.
+    FADE where none are given and the fit starts from the measured motion; held: parameters that stay as they start.
     """
     stages = list(refine or (() if start else FADE))
-    point = _Point(*(start or equation_error_start(layout, records)))
-    shapes = shape_parameters(layout)
+    point = _Point(*(start or equation_error_start(layout, records, held)))
+    shapes, stays = shape_parameters(layout), np.isin(np.arange(layout.size), held)
     kept: tuple[_Point, Step] | None = None
     least: tuple[_Point, Step, Normal] | None = None
     halvings, last, iteration = 0, np.inf, 0
@@ -197,7 +200,8 @@ def fit(
         stage = stages.pop(0) if stages else FREE_RUN
         try:
             normal, equations = normal_equations(layout, records, *point, stage=stage)
-            step = solve(layout, normal, point.theta, stage.inflate, shapes if stage.inflate > 1.0 else None)
+            stay = stays | shapes if stage.inflate > 1.0 else stays
+            step = solve(layout, normal, point.theta, stage.inflate, stay)
         except LinAlgError:
             step = None
         worse = step is None or (kept is not None and step.before > kept[1].before + 1.0)

@@ -86,11 +86,19 @@ def bounded(residuals: Sequence[np.ndarray], records: Sequence[Record]) -> list[
 
 def added(records: Sequence[Record], scales: Scales, model: Model, best: Tried) -> tuple[Scales, Model]:
     """The model with a candidate that was tried, and the scales that it then has."""
-    start = best.fit
-    if isinstance(best.addition.effect, ChannelError):
-        # the measured motion was wrong, and with it the crushes that the curves reach over
-        scales, start = make_scales(scales.structure, records, scales.cells, start.trajectories, scales.pulls), None
-    return scales, fit_model(scales.structure, records, scales, [*model.additions, as_found(best)], start)
+    additions = [*model.additions, as_found(best)]
+
+    def fitted(scales: Scales, start: Fit | None) -> tuple[Scales, Model]:
+        return scales, fit_model(scales.structure, records, scales, additions, start)
+
+    if not isinstance(best.addition.effect, ChannelError):
+        return fitted(scales, best.fit)
+    # the measured motion was wrong, and with it the crushes that the curves reach over
+    mended = make_scales(scales.structure, records, scales.cells, best.fit.trajectories, scales.pulls)
+    anew = fitted(mended, None)
+    if anew[1].left.whiteness.white:
+        return anew
+    return min(anew, fitted(scales, best.fit), key=lambda one: one[1].left.cost)
 
 
 def as_found(tried: Tried) -> Addition:

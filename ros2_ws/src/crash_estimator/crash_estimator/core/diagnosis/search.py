@@ -48,15 +48,15 @@ def _one_by_one(
     while True:
         done = one_round(records, scales, effects, model)
         rounds.append(done)
+        fair = _without(scales, model, done.best) if done.best and done.before is model else model
+        if better(fair, model):
+            # the candidate's fit has shown a better one of the model without it
+            model, rounds = fair, rounds[:-1]
+            continue
         enough = SECOND_GAIN if model.additions[present:] and model.left.whiteness.white else GAIN
         if done.best is None or done.best.gain < enough or len(rounds) > MOST_STEPS:
             # where the noise had to be taken larger, the model before the round is the one fitted with it
             return without_the_superseded(records, scales, rounds, done.before, present)
-        fair = _without(scales, model, done.best)
-        if done.before is model and better(fair, model):
-            # the candidate's fit has shown a better one of the model without it
-            model, rounds = fair, rounds[:-1]
-            continue
         scales, larger = added(records, scales, model, done.best)
         if not larger.left.whiteness.white:
             after = larger.left, assess(done.best.fit, records)

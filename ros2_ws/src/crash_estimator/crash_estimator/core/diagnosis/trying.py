@@ -13,6 +13,8 @@ from .fit import FADE, HOTTER, MOST_ITERATIONS, REFINE, SLOWLY, Fit, Stage, equa
 from .layout import Addition, Layout, make_layout
 from .model import Model
 from .motion import motion_of
+from .prior_odds import against_a_mass, against_a_share
+from .profile import profiled
 from .records import Record
 from .scales import Scales
 from .screening import Screened, changes_law, embedding, screen
@@ -30,11 +32,15 @@ LONG_LIST = 10
 MOST_HOSTS = 3
 """Bodies that an unmodelled one is tried on, with a curve to each neighbour."""
 
-AS_GIVEN = 6.0
-"""Nats that a body whose mass the model's own contain must gain over one beside them."""
+NEAR_THE_FLOOR = 2.0
+"""Mean square of what the model leaves, in units of the noise, below which a driven channel's error may be all that is
+missing: it bends the motion that all curves are fitted to, so that no linearisation tells what it would gain."""
 
 SLOW = 3
 """Candidates that are then fitted on with more care."""
+
+MOST_PROFILES = 4
+"""Laws that are fitted over their constant."""
 
 WORTH_FITTING = 1.0
 """Nats of a screened gain."""
@@ -71,12 +77,15 @@ def try_candidates(
     search = _Search(records, scales, model, by_fit)
     search.from_motion(shortlist(by_motion, SHORTLIST))
     search.from_model(shortlist(worth, SHORTLIST))
+    if thorough and model.left.cost < NEAR_THE_FLOOR:
+        search.from_motion(Screened(a, 0.0, 0.0, 1.0) for a in additions if _bends_driven_motion(scales, a))
     if thorough and not model.left.whiteness.white:
         offsets = [a for a in additions if isinstance(a.effect, ChannelError) and a.effect.role == "offset"]
         for harder in (
             search.slowly,
             lambda: search.from_model(shortlist(by_motion, SHORTLIST) + shortlist(worth, LONG_LIST)),
             lambda: search.from_motion(shortlist(worth, SHORTLIST) + shortlist(by_motion, LONG_LIST)),
+            search.profile,
             lambda: search.from_motion([start for a in offsets for start in offset_starts(records, scales, model, a)]),
             search.slowly,
             lambda: search.from_motion(shortlist(by_motion, SHORTLIST) + shortlist(worth, SHORTLIST), HOTTER),
@@ -124,6 +133,18 @@ class _Search:
         if best.taken_from:
             self._fit(replace(best, taken_from=None), None)
 
+    def profile(self) -> None:
+        """Fit the laws that end a force otherwise than the model does, over the constant that says where."""
+        laws: dict[tuple[str, str], list[Addition]] = {}
+        for one in self.screened:
+            if changes_law(one.addition):
+                laws.setdefault(one.addition.key, []).append(one.addition)
+        model, scales = self.model, self.scales
+        for first, *others in list(laws.values())[:MOST_PROFILES]:
+            layout = make_layout(scales.structure, self.records, scales, [*model.additions, first], model.roughness)
+            starts = [addition.coefficient for addition in (first, *others)]
+            self._note(first, profiled(layout, self.records, first, starts, model.fit.cost))
+
     def slowly(self) -> None:
         """Fit the best ones on, with care for forces that jump."""
         for tried in [t for t in self.ranking() if t.fit][:SLOW]:
@@ -144,12 +165,12 @@ class _Search:
 
     def _note(self, addition: Addition, found: Fit) -> None:
         self.least = min(self.least, found.cost)
-        gain = found.evidence - self.model.fit.evidence
+        gain = found.evidence - self.model.fit.evidence - against_a_mass(self.scales.structure, addition)
         before = self.found.get(addition.key)
         if (
             before is None
             or before.fit is None
-            or gain - _handicap(addition) > before.gain - _handicap(before.addition)
+            or gain - against_a_share(addition) > before.gain - against_a_share(before.addition)
         ):
             self.found[addition.key] = Tried(addition, gain, found, None)
 
@@ -193,10 +214,9 @@ def offset_starts(records: Sequence[Record], scales: Scales, model: Model, addit
     return [Screened(one, 0.0, one.coefficient, 1.0) for one in sorted(shifted, key=misfit)[:OFFSET_STARTS]]
 
 
-def _handicap(addition: Addition) -> float:
-    """Nats. Without a measured force nothing tells a body beside the model's masses from one that they contain:
-    halving every force and mass leaves the motion as it is. Then the model's masses stand as they were given."""
-    return AS_GIVEN if addition.taken_from else 0.0
+def _bends_driven_motion(scales: Scales, addition: Addition) -> bool:
+    driven = [channel for body in scales.structure.bodies if body.driven for channel in body.acceleration]
+    return isinstance(addition.effect, ChannelError) and addition.target in driven
 
 
 def shortlist(screened: Sequence[Screened], length: int) -> list[Screened]:
