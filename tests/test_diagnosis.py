@@ -1,5 +1,6 @@
 """Which effect is missing: planted effects are found with their size, nothing is found where nothing is missing."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -104,6 +105,20 @@ def test_an_effect_outside_the_vocabulary_is_not_given_a_name():
     found = diagnosed("impactor", "rotation", seed=5300)
     assert found.verdict == "unexplained"
     assert "no candidate explains what is left" in found.text
+
+
+def test_where_nothing_unloads_before_the_end_that_is_said():
+    """What only unloading shows, a recording that is cut off before cannot."""
+    model, recordings, _ = case("impactor")
+    cut = [replace(r, time_ns=r.time_ns[: early(r)], values=r.values[: early(r)]) for r in recordings]
+    said = "; the recording ends before anything unloads: what would come then is not judged"
+    assert diagnose(model, cut).text.endswith(said)
+    assert "unloads" not in diagnosed("impactor").text
+
+
+def early(recording: Recording) -> int:
+    """Samples before the deceleration is at its largest."""
+    return int(0.95 * np.argmin(recording.values[:, recording.test.index("impactor_ax")]))
 
 
 def test_with_the_effect_in_it_the_model_is_adequate():

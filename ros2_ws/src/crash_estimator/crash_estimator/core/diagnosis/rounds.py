@@ -12,6 +12,7 @@ from .fit import REFINE, Fit, fit
 from .layout import Addition, Layout
 from .model import Model, fit_model
 from .motion import motion_of
+from .normal import may_diverge
 from .records import Record
 from .scales import Scales, make_scales
 from .screening import embedding
@@ -78,6 +79,7 @@ def better(one: Model, other: Model) -> bool:
     return one.fit.evidence > other.fit.evidence + 1.0 and one.left.cost < other.left.cost
 
 
+@may_diverge
 def bounded(residuals: Sequence[np.ndarray], records: Sequence[Record]) -> list[np.ndarray]:
     """Residuals, and what was measured itself where a motion without bounds has left more."""
     pairs = zip(residuals, (record.measured for record in records))

@@ -171,7 +171,8 @@ def make_scales(
 
 def _peak(record: Record, rows: list[int]) -> float:
     """Largest mean over a bin of a body's outputs."""
-    sums = np.zeros((record.bins, 2))
-    values = np.nanmean(record.measured[:, rows], axis=1)
-    np.add.at(sums, record.bin[record.at], np.stack([np.nan_to_num(values), np.isfinite(values)], axis=1))
+    sums, found = np.zeros((record.bins, 2)), record.measured[:, rows]
+    known = np.isfinite(found)
+    each = np.stack([np.where(known, found, 0.0).sum(axis=1), known.sum(axis=1)], axis=1)
+    np.add.at(sums, record.bin[record.at], each)
     return float(np.abs(sums[:, 0] / np.maximum(sums[:, 1], 1.0)).max())

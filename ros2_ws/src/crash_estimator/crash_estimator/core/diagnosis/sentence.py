@@ -31,7 +31,8 @@ def _said(verdict, steps, ranking, first: Model, final: Model, floor: float, dri
     size = f"residual RMS {first.left.rms / G:.3g} -> {final.left.rms / G:.3g} g, noise floor {floor / G:.3g}"
     if verdict == "adequate":
         left = f"residual RMS {final.left.rms / G:.3g} g, noise floor {floor / G:.3g}"
-        return f"adequate: nothing significant is missing ({left})"
+        until = "" if _unloads(final) else "; the recording ends before anything unloads: what would come then is not judged"
+        return f"adequate: nothing significant is missing ({left}){until}"
     if verdict == "effect_missing":
         advice = ""
         rivals = ranking[0].confounded_with if ranking else ()
@@ -58,3 +59,9 @@ def _said(verdict, steps, ranking, first: Model, final: Model, floor: float, dri
     left = f"no candidate explains what is left, most of it in {where}"
     also = f"; it goes along with {along}" if drift.share > GOES_ALONG and not drift.constant else ""
     return f"unexplained: {done}{size}; {left}{also}"
+
+
+def _unloads(model: Model) -> bool:
+    """Whether any element is seen to come back from its largest crush."""
+    links = [link for record in model.left.links for link in record]
+    return any((link.unloads & ~link.apart).any() for link in links)
