@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 from crash_estimator.cli import diagnose as command
+from crash_estimator.cli import estimate
 from crash_estimator.core.diagnosis.diagnosis import Diagnosis, diagnose
 from crash_estimator.diagnosis_doubt import doubt
 from crash_estimator.model_file import load_model, model_path
@@ -44,6 +45,22 @@ def test_a_model_that_explains_little_and_is_not_mended_is_doubted_below_the_ver
     assert status.value.code == 0 and said[0].startswith("unexplained")
     why = "as given it explains 0% of car_ax"
     assert said[1:3] == [f"the model itself or the recording may be wrong ({why}): {ADVICE} (car 13.3 m/s)", ""]
+
+
+def test_an_element_that_is_written_the_wrong_way_round_is_named(monkeypatch, capsys, tmp_path):
+    """Crush is the first body's way less the second's: the other way round a barrier is never run into."""
+    model = yaml.safe_load(Path(model_path("frontal_single")).read_text())
+    (name,) = model["elements"]
+    model["elements"][name]["between"].reverse()
+    wrong = tmp_path / "wrong.yaml"
+    wrong.write_text(yaml.safe_dump(model))
+    why = f"{name} never touches (the first body of its `between` is the one that runs into the other)"
+    for tool, tail in ((command, "as given it explains 0% of"), (estimate, "")):
+        monkeypatch.setattr(sys, "argv", ["tool", str(BAGS / "frontal_single.mcap"), "--model", str(wrong)])
+        with pytest.raises(SystemExit):
+            tool.main()
+        said = capsys.readouterr().out
+        assert why in said and tail in said
 
 
 def test_a_stack_of_effects_is_doubted_though_they_leave_only_noise():

@@ -1,14 +1,16 @@
 """When what was found should not be believed before the model itself has been checked: one sentence.
 
 A structure that is wrong in its bodies, masses or attachments, or a recording that is in its units, signs or initial
-velocities, still gets an answer, as the effects of the vocabulary are bent to do its work. What gives it away: as given it leaves most of what a channel measures, and no effect mends
-that; or effects are stacked; or one of them is as large as it may be.
+velocities, still gets an answer, as the effects of the vocabulary are bent to do its work. What gives it away: as given
+it leaves most of what a channel measures, and no effect mends that; or an element never touches; or effects are
+stacked; or one of them is as large as it may be.
 """
 
 import numpy as np
 
 from .core.diagnosis.diagnosis import Diagnosis
 from .core.diagnosis.model import Model
+from .tables import never_touches
 
 LITTLE = 0.5
 """Share of a channel's mean square: with less, what is missing is larger than what is there."""
@@ -30,6 +32,7 @@ def doubt(found: Diagnosis) -> str:
     channel, share = worst_explained(found.models[0])
     if share < LITTLE and found.verdict == "unexplained":
         reasons.append(f"as given it explains {max(share, 0.0):.0%} of {channel}")
+    reasons += [never_touches(name) for name in untouched(found.models[0])]
     if len(found.steps) >= STACK:
         reasons.append(f"it takes {len(found.steps)} effects to mend it")
     reasons += [f"{name} is as large as it may be" for name in at_limit(found)]
@@ -43,6 +46,12 @@ def starts(found: Diagnosis) -> str:
     """How fast the free bodies start in the first recording: one forgotten, or the wrong way, is easily seen."""
     given = found.models[0].records[0].test.initial_velocity
     return ", ".join(f"{b.name} {given.get(b.name, 0.0):.4g}" for b in found.structure.bodies if b.free) + " m/s"
+
+
+def untouched(model: Model) -> list[str]:
+    """Elements that are apart in all recordings."""
+    of_each = zip(model.fit.layout.structure.elements, *model.left.links)
+    return [element.name for element, *links in of_each if all(link.apart.all() for link in links)]
 
 
 def worst_explained(model: Model) -> tuple[str, float]:

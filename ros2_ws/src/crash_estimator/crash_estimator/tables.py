@@ -58,6 +58,11 @@ def parameter_table(description: Description, estimates: Sequence[Estimate]) -> 
     return table(("parameter at peak force", "value", "sigma", "unit", "status", "at ms", "crush mm", "force kN"), rows)
 
 
+def never_touches(name: str) -> str:
+    """Of an element that is apart in all of a recording."""
+    return f"{name} never touches (the first body of its `between` is the one that runs into the other)"
+
+
 def known_effects_table(given: Sequence[EffectSpec], effects: Mapping[str, Effect], description: Description) -> str:
     """Effects with a known coefficient that is no parameter: it is in an element, a mass or the samples; or nothing."""
     rows = [

@@ -8,11 +8,11 @@ import numpy as np
 from crash_replay.recording import Recording
 
 from ..core.errors import EquationError, equation_errors
-from ..core.estimate import Description, Estimate, ParameterStatus
+from ..core.estimate import Description, ElementState, Estimate, ParameterStatus
 from ..core.fold import run
 from ..core.methods import METHODS, make_estimator
 from ..model_file import load_model, ready_models
-from ..tables import besides_table, error_table, known_effects_table, parameter_table
+from ..tables import besides_table, error_table, known_effects_table, never_touches, parameter_table
 from .common import add_effects_option, effects_of, guarded, parse_settings, read_crash, write_json
 
 
@@ -48,6 +48,9 @@ def estimate(arguments: argparse.Namespace) -> None:
     if known := known_effects_table(structure.effects, effects, description):
         print(f"{known}\n")
     print(error_table(errors))
+    for k, name in enumerate(description.elements):
+        if all(estimate.state[k] == ElementState.APART for estimate in estimates):
+            print(f"\n{never_touches(name)}")
     if description.extra:
         print()
         print(besides_table(description, estimates[-1]))
