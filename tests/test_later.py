@@ -2,10 +2,18 @@
 
 import numpy as np
 import pytest
+from helpers_estimation import oscillator, oscillator_recording
 
-from crash_estimator.following.columns import Columns, Parts
+from crash_estimator.core.methods import make_estimator
+from crash_estimator.following.columns import follow
+from crash_estimator.following.follower import Follower
+from crash_estimator.kept import Kept, Rows
 from crash_estimator.nodes import later
-from crash_estimator.nodes.later import HOLD, PERIOD, RUSH, Later
+from crash_estimator.nodes.later import HOLD, RUSH, Later
+from crash_estimator.rush import LULL, PERIOD
+
+
+OVER = LULL + 2.0 * PERIOD
 
 
 class Stand:
@@ -43,14 +51,27 @@ def test_what_comes_in_a_rush_is_published_when_it_is_over(stand):
     said = in_a_rush(stand, 5)
     stand.later.look()
     assert not stand.published
-    stand.now += 2.0 * PERIOD
+    stand.now += OVER
     stand.later.look()
     assert stand.published == said and not stand.later.held
 
 
+def test_one_slow_period_is_not_the_end_of_a_rush(stand):
+    said = in_a_rush(stand, 3)
+    stand.say(b"slow", 1, 2.0 * PERIOD)
+    stand.later.look()
+    assert not stand.published
+    said += [b"slow", *in_a_rush(stand, 2)]
+    stand.later.look()
+    assert not stand.published
+    stand.now += OVER
+    stand.later.look()
+    assert stand.published == said
+
+
 def test_what_comes_after_a_rush_comes_after_what_waits(stand):
     said = in_a_rush(stand, 3)
-    stand.say(b"last", 1, 2.0 * PERIOD)
+    stand.say(b"last", 1, OVER)
     assert not stand.published
     stand.later.look()
     assert stand.published == [*said, b"last"]
@@ -58,7 +79,7 @@ def test_what_comes_after_a_rush_comes_after_what_waits(stand):
 
 def test_no_faster_than_it_is_taken(stand, monkeypatch):
     in_a_rush(stand, 3)
-    stand.now += 2.0 * PERIOD
+    stand.now += OVER
     stand.taken = False
     monkeypatch.setattr(later.time, "sleep", lambda seconds: setattr(stand, "now", stand.now + seconds))
     stand.later.look()
@@ -76,17 +97,34 @@ def test_what_must_go_now_takes_along_what_waits(stand):
     assert stand.published == [*said, b"now"]
 
 
-@pytest.mark.parametrize("of_rows", [True, False])
-def test_fields_are_kept_without_the_others(of_rows):
-    rows = np.random.default_rng(1).normal(size=(4, 9)).round(1)
-    rows[:, 5:7] = [[0, 1], [2, 3], [3, 2], [1, 0]]
-    places = {"parameters": slice(0, 3), "force": slice(3, 5), "state": slice(5, 7), "rate": slice(7, 9)}
-    whole = Parts(rows, places)
-    of = whole if of_rows else {field: whole[field] for field in ("value", "force", "state", "rate")}
-    columns = Columns(7, np.arange(4), of, ())
-    kept = columns.only(("force", "state"))
-    assert (kept.number, len(kept)) == (7, 4)
-    for field in ("force", "state"):
-        np.testing.assert_array_equal(kept.of[field], columns.of[field])
-        assert kept.of[field].dtype == columns.of[field].dtype
-    assert not of_rows or kept.of.table.shape == (4, 4)
+FIELDS = ("force", "rate", "state", "acceleration")
+
+
+@pytest.mark.parametrize("method", ["mrls", "constrained_kalman", "gauss_newton"])
+def test_what_is_given_later_is_the_same(method):
+    """To the last bit, whether the method's estimates are kept or computed again, and whatever has come since."""
+    recording = oscillator_recording(noise=3.0)
+    estimator, rows = make_estimator(oscillator(), recording.test, method), Rows(0, recording.time_ns, recording.values)
+    state, _ = follow(estimator, estimator.init(), rows.first(100))
+    state, columns = follow(estimator, state, rows.without(100).first(100))
+    give, _ = columns.later(FIELDS)
+    follow(estimator, state, rows.without(200))
+    given = give()
+    assert (given.number, len(given)) == (100, 100)
+    np.testing.assert_array_equal(given.time_ns, columns.time_ns)
+    for field in FIELDS:
+        np.testing.assert_array_equal(given.of[field], columns.of[field])
+        assert given.of[field].dtype == columns.of[field].dtype
+
+
+def test_to_give_it_later_takes_no_memory_but_that_of_a_state():
+    recording = oscillator_recording(n=1950)
+    estimator = make_estimator(oscillator(), recording.test, "constrained_kalman")
+    follower = Follower(estimator, Kept(recording.test, len(recording)))
+    rows = Rows(0, recording.time_ns, recording.values)
+    follower.keep(rows)
+    _, size = follower.follow(rows).later(FIELDS)
+    _, of_one = follow(estimator, estimator.init(), rows.first(1))[1].later(FIELDS)
+    assert 0 < size == of_one
+    give, _ = follower.follow(rows).later(FIELDS)
+    assert np.shares_memory(give().time_ns, follower.kept.time_ns), "the samples are those that are kept anyway"

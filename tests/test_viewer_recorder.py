@@ -16,7 +16,7 @@ from rerun.chunk import RrdReader
 
 from crash_estimator.viewer.blocks import ForceBlock, ParameterBlock
 from crash_estimator.viewer.native import viewer_binary
-from crash_estimator.viewer.recorder import HOLD, MOST
+from crash_estimator.viewer.recorder import HOLD, MOST, SHARE
 from crash_estimator.viewer.sinks import usable_port
 
 pytestmark = pytest.mark.usefixtures("strict")
@@ -246,6 +246,19 @@ def test_what_comes_in_a_rush_is_drawn_when_enough_of_it_waits_and_the_rest_at_o
     target.put(lambda: drawn.append(0), size=1000)
     settle(target)
     assert drawn == [0]
+    target.close()
+
+
+def test_what_follows_a_rush_is_not_put_off_for_the_time_that_drawing_the_rush_took(tmp_path, monkeypatch):
+    """The forces, which the estimators have put off too, are all that is missing in the picture then."""
+    monkeypatch.setattr("crash_estimator.viewer.recorder.RUSH", 1e6)
+    target, drawn = recorder(tmp_path / "after.rrd"), []
+    target.put(lambda: time.sleep(0.5), size=10_000_000)
+    settle(target)
+    after = time.monotonic()
+    target.put(lambda: drawn.append(time.monotonic()), size=1000)
+    settle(target)
+    assert drawn[0] - after < 0.5 * 0.5 * (1 - SHARE) / SHARE, "half the pause after as long a batch otherwise"
     target.close()
 
 

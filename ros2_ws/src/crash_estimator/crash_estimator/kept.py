@@ -67,8 +67,11 @@ class Kept:
         there = start + np.flatnonzero(self.seen[start:end])
         for piece in np.split(there, np.flatnonzero(np.diff(there) > 1) + 1):
             for k in range(0, len(piece), longest):
-                first, stop = int(piece[k]), int(piece[min(k + longest, len(piece)) - 1]) + 1
-                yield Rows(first, self.time_ns[first:stop], self.values[first:stop])
+                yield self.rows(int(piece[k]), int(piece[min(k + longest, len(piece)) - 1]) + 1)
+
+    def rows(self, start: int, end: int) -> Rows:
+        """The samples of number start, ..., end - 1, all of which have been seen; views."""
+        return Rows(start, self.time_ns[start:end], self.values[start:end])
 
     def missing(self, end: int) -> int:
         """How many of the samples before number `end` have not been seen."""

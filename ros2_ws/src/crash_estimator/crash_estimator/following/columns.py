@@ -1,7 +1,7 @@
 """Estimates of consecutive samples as columns, the form in which they travel: from the compiled recursion's rows as
 they are, or from `Estimate`s."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isfinite
 from typing import Any, NamedTuple
 
@@ -26,14 +26,38 @@ class Columns(NamedTuple):
     time_ns: np.ndarray  # (k,) int64
     of: Mapping[str, np.ndarray]  # field of the messages -> (k, width)
     events: Sequence[tuple[int, Event]]  # row, event
+    again: "Again | None" = None
 
     def __len__(self) -> int:
         return len(self.time_ns)
 
-    def only(self, fields: Sequence[str]) -> "Columns":
-        """These fields without the others, to keep for a while."""
-        of = self.of.only(fields) if isinstance(self.of, Parts) else {field: self.of[field] for field in fields}
-        return Columns(self.number, self.time_ns, of, ())
+    def later(self, fields: Sequence[str]) -> tuple[Callable[[], "Columns"], int]:
+        """What gives these fields when they are wanted, and the bytes that it keeps until then."""
+        if self.again:
+            return self.again.columns, self.again.nbytes
+        kept = Columns(self.number, self.time_ns, {field: self.of[field] for field in fields}, ())
+        return lambda: kept, sum(array.nbytes for array in kept.of.values())
+
+
+class Again(NamedTuple):
+    """Computes a block's estimates once more, the same to the last bit.
+
+    All it keeps is a state, the samples being kept anyway: to find new memory for what it gives, 200 bytes a sample and
+    more for the forces alone, takes a compiled recursion 5 % of its time.
+    """
+
+    estimator: CompiledEstimator
+    state: CompiledState  # before the block
+    rows: Rows  # views of what is kept
+
+    @property
+    def nbytes(self) -> int:
+        return sum(array.nbytes for array in self.state)
+
+    def columns(self) -> Columns:
+        """Without the events."""
+        _, table = self.estimator.follow(self.state, self.rows.time_ns, self.rows.values)
+        return Columns(self.rows.number, self.rows.time_ns, Parts(table, self.estimator.columns), ())
 
 
 class FilterFailure(Exception):
@@ -80,24 +104,23 @@ def columns_of(estimates: Sequence[Estimate]) -> Columns:
 
 
 def _follow_compiled(estimator: CompiledEstimator, state: CompiledState, rows: Rows) -> tuple[CompiledState, Columns]:
-    before = state.last_row
-    state, table = estimator.follow(state, rows.time_ns, rows.values)
+    after, table = estimator.follow(state, rows.time_ns, rows.values)
     value = table[:, estimator.columns["parameters"]]
     if not isfinite(value[-1].sum()):  # what is not finite once stays so
         good = int(np.argmin(np.isfinite(value).all(axis=1)))
-        done = _columns(estimator, rows.first(good), table[:good], before) if good else None
+        done = _columns(estimator, state, rows.first(good), table[:good]) if good else None
         number, time_ns = rows.number + good, int(rows.time_ns[good])
         raise FilterFailure(estimator.description.method, number, time_ns, NOT_FINITE, done)
-    return state, _columns(estimator, rows, table, before)
+    return after, _columns(estimator, state, rows, table)
 
 
-def _columns(estimator: CompiledEstimator, rows: Rows, table: np.ndarray, before: np.ndarray) -> Columns:
+def _columns(estimator: CompiledEstimator, state: CompiledState, rows: Rows, table: np.ndarray) -> Columns:
     events = [
         (k, event)
         for k in np.flatnonzero(table[:, estimator.columns["news"]]).tolist()
-        for event in estimator.events(table[k], table[k - 1] if k else before, int(rows.time_ns[k]))
+        for event in estimator.events(table[k], table[k - 1] if k else state.last_row, int(rows.time_ns[k]))
     ]
-    return Columns(rows.number, rows.time_ns, Parts(table, estimator.columns), events)
+    return Columns(rows.number, rows.time_ns, Parts(table, estimator.columns), events, Again(estimator, state, rows))
 
 
 class Parts(Mapping):
@@ -109,13 +132,6 @@ class Parts(Mapping):
     def __getitem__(self, field: str) -> np.ndarray:
         part = self.table[:, self.places["parameters" if field == "value" else field]]
         return part.astype(np.uint8) if field in ("status", "state") else part
-
-    def only(self, fields: Sequence[str]) -> "Parts":
-        """A copy of the columns from the first of these fields to the last."""
-        places = {field: self.places[field] for field in fields}
-        first, end = min(p.start for p in places.values()), max(p.stop for p in places.values())
-        kept = {field: slice(p.start - first, p.stop - first) for field, p in places.items()}
-        return Parts(self.table[:, first:end].copy(), kept)
 
     def __iter__(self) -> Iterator[str]:
         return iter((*FIELDS, "value", "std", "innovation_std"))

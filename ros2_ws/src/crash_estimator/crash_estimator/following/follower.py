@@ -62,7 +62,8 @@ class Follower:
     def follow(self, rows: Rows) -> Columns:
         """The estimates of consecutive samples that are kept; raises FilterFailure, and stays before them."""
         self.go_to(rows.number)
-        state, columns = follow(self.estimator, self.state, rows)
+        own = self.kept.rows(rows.number, rows.end)  # what is computed again from them holds no memory of its own
+        state, columns = follow(self.estimator, self.state, own)
         self.position, self.state = rows.end, state
         self.checkpoints.offer(self.position, state)
         return columns

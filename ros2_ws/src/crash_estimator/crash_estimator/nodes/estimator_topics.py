@@ -59,11 +59,10 @@ class EstimatorTopics:
 
         Where a replay in lock-step listens to the answers, all that there is to say is said before.
         """
-        waits, size = self.later.count(len(columns)) and not self.answers.get_subscription_count(), 0
-        if waits:
-            columns = columns.only(FIELDS[Forces])
-            size = sum(columns.of[field].nbytes for field in FIELDS[Forces])
-        self.later.put(partial(self.messages.forces, stamp_ns, run, columns), size, waits)
+        waits = self.later.count(len(columns)) and not self.answers.get_subscription_count()
+        give, size = columns.later(FIELDS[Forces]) if waits else (lambda: columns, 0)
+        messages = self.messages  # of this model, though there may be another one by then
+        self.later.put(lambda: messages.forces(stamp_ns, run, give()), size, waits)
         if self.later.waiting and self.looking.is_canceled():
             self.looking.reset()
 

@@ -4,10 +4,10 @@ import time
 from collections import deque
 from collections.abc import Callable
 
+from ..rush import Rush
+
 RUSH = 60_000.0
 """Samples a second from which on it is one: no replay in real time is as fast, and nobody can look at what goes by."""
-PERIOD = 0.05
-"""s over which they are counted."""
 HOLD = 128_000_000
 """Bytes that wait at most: what comes then pushes the oldest out."""
 LOOK = 0.02
@@ -31,14 +31,12 @@ class Later:
         self.publish, self.taken, self.clock = publish, taken, clock
         self.waiting: deque[tuple[Make, int]] = deque()
         self.held = 0  # bytes
-        self.rush = False
-        self.came, self.looked = 0, clock()  # samples since then
+        self.rush = Rush(RUSH, clock)
 
     def count(self, samples: int) -> bool:
         """So many have come -> whether what there is to say of them can wait."""
-        self.came += samples
-        self._see()
-        return self.rush or bool(self.waiting)
+        self.rush.count(samples)
+        return self.rush.look() or bool(self.waiting)
 
     def put(self, make: Make, size: int, wait: bool) -> None:
         """make: gives the message, of some `size` bytes; wait: False where this and all before must go now."""
@@ -49,18 +47,14 @@ class Later:
 
     def look(self) -> None:
         """Publish some of what waits, if the rush is over."""
-        self._see()
+        if self.rush.look():
+            return
         end = self.clock() + AT_A_TIME
-        while self.waiting and not self.rush and self.clock() < end:
+        while self.waiting and self.clock() < end:
             if self.taken():
                 self._publish()
             else:
                 time.sleep(0.0005)
-
-    def _see(self) -> None:
-        if (passed := self.clock() - self.looked) > PERIOD:
-            self.rush = self.came > RUSH * passed
-            self.came, self.looked = 0, self.clock()
 
     def _publish(self) -> None:
         make, size = self.waiting.popleft()

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from crash_replay.scheduling import step_back
 
 from ..core.structure import Structure
+from ..rush import Rush
 from .blocks import Block, EventBlock, TestBlock
 from .findings import Finding
 from .judged import Jury
@@ -23,9 +24,9 @@ PERIOD = 0.05
 SHARE = 0.2
 """Of the time that writing may take: the longer a batch takes, the rarer, larger and so cheaper they become."""
 
-RUSH, HOLD = 40e6, 256e6
+RUSH, HOLD = 30e6, 256e6
 """While more than RUSH bytes come in a second, drawing is put off until HOLD bytes wait: nobody can look at what goes
-by so fast. Two estimators at 20 kHz say half as much in real time, and are drawn as they speak."""
+by so fast. Two estimators at 20 kHz say two thirds as much in real time, and are drawn as they speak."""
 BACK = 10
 """Niceness of the viewer meanwhile."""
 MOST = 2.0 * HOLD
@@ -68,8 +69,7 @@ class Recorder:
         self._stop = threading.Event()
         self._busy = False
         self._held = 0  # bytes in the queue
-        self._came, self._looked = 0, self.last_put  # bytes since then
-        self._rush = False
+        self._rush, self._stepped_back = Rush(RUSH), False
         self._test: TestBlock | None = None
         self._replay = 0  # a replay that is started again counts its runs from 0 again
         self._passes: dict[tuple[int, int], Pass] = {}  # by (replay, run), the newest last
@@ -90,7 +90,7 @@ class Recorder:
         with self._guard:
             index = self._counts[stream]
             self._counts[stream] += 1
-            self._came += size
+            self._rush.count(size)
             entry = Entry(stream, index, make, size)
             if len(self._queue) >= self.limit or self._held > MOST:
                 self._thin()
@@ -140,23 +140,23 @@ class Recorder:
     def _work(self) -> None:
         pause = PERIOD
         while not self._stop.wait(pause):
-            began, pause = time.monotonic(), PERIOD
-            if self._put_off(began):
+            began, pause, was_rush = time.monotonic(), PERIOD, self._stepped_back
+            if self._put_off():
                 continue
             self._write_batch()
-            pause = max(PERIOD, (time.monotonic() - began) * (1 - SHARE) / SHARE)
+            if not was_rush or self._stepped_back:  # after a rush what was put off comes at once, and nothing is slowed
+                pause = max(PERIOD, (time.monotonic() - began) * (1 - SHARE) / SHARE)
         self._write_batch()
         for pass_ in reversed([*filter(None, [self._spare]), *self._passes.values()]):  # the one with the server last
             self._guarded(pass_.end)
 
-    def _put_off(self, now: float) -> bool:
+    def _put_off(self) -> bool:
         """Whether so much comes that drawing it can wait: the estimators may need what it would take."""
         with self._guard:
-            came, self._came = self._came, 0
-            rush, self._looked = came > RUSH * (now - self._looked), now
+            rush = self._rush.look()
             put_off = rush and self._held < HOLD
-        if rush != self._rush:
-            self._rush = rush
+        if rush != self._stepped_back:
+            self._stepped_back = rush
             step_back(BACK if rush else 0)
         return put_off
 
