@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import rclpy
 from crash_msgs.msg import Parameters, Residuals, Samples, TestInfo
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
@@ -191,17 +192,28 @@ def _listen(executor: EventsExecutor, stop: threading.Event) -> None:
 
 
 class Arrivals(Node):
-    """When each message on `samples` came."""
+    """When each message on `samples` was published, as the middleware's writer has stamped it, and when it came."""
 
     def __init__(self):
         super().__init__("arrivals")
-        self.times: list[float] = []
-        self.create_subscription(Samples, "samples", lambda _: self.times.append(time.perf_counter()), EVERY_SAMPLE)
+        self.published: list[float] = []
+        self.came: list[float] = []
+        self.create_subscription(Samples, "samples", self._take, EVERY_SAMPLE)
+
+    def _take(self, _: Samples, info: dict) -> None:
+        self.came.append(time.perf_counter())
+        self.published.append(info["source_timestamp"] * 1e-9)
 
 
-def jitter(folder: Path, environment: dict[str, str], bag: Path, period: float) -> np.ndarray:
-    """s by which each sample of a paced replay came off its even beat."""
-    executor, node = EventsExecutor(), Arrivals()
+class Jitter(NamedTuple):
+    """s by which each sample of a paced replay was off its even beat."""
+
+    published: np.ndarray
+    came: np.ndarray
+
+
+def jitter(folder: Path, environment: dict[str, str], bag: Path, period: float) -> Jitter:
+    executor, node = SingleThreadedExecutor(), Arrivals()  # rclpy 7.1: EventsExecutor gives no message's information
     executor.add_node(node)
     with Children(folder, environment) as children:
         child = children.start(
@@ -211,8 +223,11 @@ def jitter(folder: Path, environment: dict[str, str], bag: Path, period: float) 
             executor.spin_once(timeout_sec=0.05)
     executor.shutdown()
     node.destroy_node()
-    times = np.array(node.times)
-    off = times - period * np.arange(len(times))
+    return Jitter(_off_beat(node.published, period), _off_beat(node.came, period))
+
+
+def _off_beat(times: Sequence[float], period: float) -> np.ndarray:
+    off = np.array(times) - times[0] - period * np.arange(len(times))
     return np.abs(off - np.median(off))
 
 
