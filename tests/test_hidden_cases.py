@@ -15,7 +15,8 @@ from crash_replay.bag import read_bag, write_bag
 from crash_replay.recording import RecordingError
 from crash_replay.synthetic.hidden.bundled import NAME, bundled_case
 from crash_replay.synthetic.hidden.cases import EFFECTS, draw_case, hideable
-from crash_replay.synthetic.hidden.observable import SHOWS, distance
+from crash_replay.synthetic.hidden.curves import straight
+from crash_replay.synthetic.hidden.observable import SHOWS, distance, shows
 from crash_replay.synthetic.hidden.specimen import peaks_of
 from crash_replay.synthetic.hidden.structures import STRUCTURES
 
@@ -98,6 +99,19 @@ def test_an_effect_too_small_to_show_is_drawn_again():
     plain = replace(case, specimen=case.specimen.with_sensor(case.hidden[0].target, delay=0.0)).specimen
     assert distance(plain, case.specimen) > SHOWS
     assert distance(plain, plain) == 0.0
+
+
+def test_a_driven_channel_is_wrong_only_where_what_it_drives_shows_it():
+    """Most moves the channel itself, but a model is driven by it: the others are what it predicts."""
+    bare = draw_case("dummy", (), 3).specimen
+    beside_the_car = [e.name for e in bare.scenario.system.elements if "car" in e.between]
+    loose = bare
+    for name in beside_the_car:
+        loose = loose.with_law(name, curve=straight(1.0), damping=0.0)
+    for specimen, told in ((bare, True), (loose, False)):
+        wrong = specimen.with_sensor("car_ay", distortion=lambda time, signal: 1.2 * signal)
+        assert distance(specimen, wrong) > SHOWS
+        assert shows(specimen, "channel_gain", "car_ay", wrong) == told
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..effects.base import ChannelError, Effect
 from .assess import Left, assess
-from .fit import REFINE, Fit, fit
+from .fit import HOTTER, REFINE, Fit, fit
 from .layout import Addition, Layout
 from .model import Model, fit_model
 from .motion import motion_of
@@ -91,7 +91,12 @@ def added(records: Sequence[Record], scales: Scales, model: Model, best: Tried) 
     additions = [*model.additions, as_found(best)]
 
     def fitted(scales: Scales, start: Fit | None) -> tuple[Scales, Model]:
-        return scales, fit_model(scales.structure, records, scales, additions, start)
+        model = fit_model(scales.structure, records, scales, additions, start)
+        if model.left.whiteness.white:
+            return scales, model
+        anew = fit(model.fit.layout, records, refine=HOTTER)  # the usual stages may have led astray
+        anew = model._replace(fit=anew, left=assess(anew, records, sharply=True))
+        return scales, anew if better(anew, model) else model
 
     if not isinstance(best.addition.effect, ChannelError):
         return fitted(scales, best.fit)

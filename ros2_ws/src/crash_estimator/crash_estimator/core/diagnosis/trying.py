@@ -88,6 +88,7 @@ def try_candidates(
             search.profile,
             lambda: search.from_motion([start for a in offsets for start in offset_starts(records, scales, model, a)]),
             search.slowly,
+            search.hotter,
             lambda: search.from_motion(shortlist(by_motion, SHORTLIST) + shortlist(worth, SHORTLIST), HOTTER),
         ):
             if search.reached_the_floor():
@@ -152,6 +153,11 @@ class _Search:
             self._note(
                 tried.addition, fit(tried.fit.layout, self.records, start, refine=SLOWLY, most=2 * MOST_ITERATIONS)
             )
+
+    def hotter(self) -> None:
+        """Fit the best ones from the measured motion, which less is believed of."""
+        for tried in [t for t in self.ranking() if t.fit][:SLOW]:
+            self._fit(tried.addition, None, HOTTER)
 
     def _fit(self, addition: Addition, screened: Screened | None, stages: Sequence[Stage] = FADE) -> None:
         stages = REFINE if screened else stages

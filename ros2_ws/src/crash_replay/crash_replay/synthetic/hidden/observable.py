@@ -13,15 +13,19 @@ Left out, because no method could name them from what is recorded:
 - `load_path` in a structure whose bodies are all joined already;
 - a `clearance` or other law with which the element hardly carries any more: no stiffness at all then does as well;
 - whatever moves the recorded accelerations and forces by less than SHOWS in all, beside the other effects hidden;
+- a driven channel's error that moves what the channel drives by less than that: the channel itself is no prediction;
 - what is outside the vocabulary in name only: by less than SHOWS_OUTSIDE from the nearest effect inside, such as a mass
   that has grown before the body is pushed. It is more than SHOWS because several effects together come nearer than one.
 """
 
 import numpy as np
 from scipy.constants import g as G
+from scipy.integrate import cumulative_trapezoid
 
 from ..integrate import History, simulate
 from ..scenario import signals_of
+from ..sensors import Sensor
+from ..system import Motion
 from .outside import OUTSIDE, nearest_inside
 from .specimen import COARSE_RATE, COARSE_STEP, SPEEDS, Peaks, Specimen, peaks_of
 
@@ -93,15 +97,36 @@ def shows(bare: Specimen, effect: str, target: str, with_it: Specimen) -> bool:
         return False
     if effect in OUTSIDE and distance(nearest_inside(with_it, effect, target), with_it) < SHOWS_OUTSIDE:
         return False
+    if (sensor := _driving(with_it, target)) is not None:
+        return distance(bare, _driven_as_recorded(bare, sensor), besides=target) >= SHOWS
     return distance(bare, with_it) >= SHOWS
 
 
-def distance(specimen: Specimen, other: Specimen) -> float:
-    """Standard deviations between what the sensors of two specimens record, without noise; see SHOWS."""
+def distance(specimen: Specimen, other: Specimen, besides: str = "") -> float:
+    """Standard deviations between what the sensors of two specimens record, without noise; see SHOWS.
+
+    besides: a channel that is left out.
+    """
     total = 0.0
     for ours, theirs in zip(_recorded(specimen), _recorded(other)):
-        total += sum(np.sum((ours[c] - theirs[c]) ** 2) for c in ours.keys() & theirs.keys())
+        total += sum(np.sum((ours[c] - theirs[c]) ** 2) for c in (ours.keys() & theirs.keys()) - {besides})
     return float(np.sqrt(total * specimen.scenario.rate / COARSE_RATE))
+
+
+def _driving(specimen: Specimen, channel: str) -> Sensor | None:
+    """The sensor that has the channel, where its body is driven."""
+    sensors = [s for s in specimen.scenario.sensors if s.channel.name == channel]
+    return next((s for s in sensors if s.of in specimen.model["bodies"] and specimen.body(s.of).motion), None)
+
+
+def _driven_as_recorded(bare: Specimen, sensor: Sensor) -> Specimen:
+    """The specimen as a model would have it that takes a wrong channel for its body's motion."""
+    motion, step = bare.body(sensor.of).motion, 1.0 / COARSE_RATE
+    time = np.arange(0.0, bare.scenario.duration + step, step)
+    seen = np.where(time >= sensor.delay, motion.acceleration(time - sensor.delay), 0.0)
+    seen = sensor.distortion(time, seen) if sensor.distortion else seen
+    velocity = motion.velocity[0] + cumulative_trapezoid(seen, time, initial=0.0)
+    return bare.with_body(sensor.of, motion=Motion(time, velocity))
 
 
 def _recorded(specimen: Specimen) -> list[dict[str, np.ndarray]]:
