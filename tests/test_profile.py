@@ -10,7 +10,7 @@ from crash_estimator.core.diagnosis.fit import fit
 from crash_estimator.core.diagnosis.layout import make_layout
 from crash_estimator.core.diagnosis.model import fit_model
 from crash_estimator.core.diagnosis.prior_odds import WEIGHED, against_a_mass
-from crash_estimator.core.diagnosis.profile import profiled
+from crash_estimator.core.diagnosis.profile import closer, profile
 from crash_estimator.core.diagnosis.records import make_record
 from crash_estimator.core.diagnosis.scales import make_scales
 from crash_estimator.core.effects import EFFECTS
@@ -39,7 +39,7 @@ def test_where_a_jump_stops_every_other_fit_the_profile_arrives(seed, noise):
     samples = sum(record.bins * record.measured.shape[1] for record in records)
     usual = [fit(make_layout(structure, records, scales, [one], base.roughness), records).cost for one in offered]
     assert min(usual) > 1.2 * samples, "the usual fit arrives: this test shows nothing"
-    found = profiled(layout, records, offered[0], [one.coefficient for one in offered], base.fit.cost)
+    found = closer(profile(layout, records, offered[0], [one.coefficient for one in offered]), records)
     assert found.cost < 1.05 * samples
     (place,) = found.layout.places
     assert found.theta[place.coefficient] == pytest.approx(hidden.coefficient, rel=0.02)

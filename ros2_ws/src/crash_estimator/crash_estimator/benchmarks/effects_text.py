@@ -35,7 +35,8 @@ search, and the structure is then drawn anew
 - `load_path` where all bodies are joined already;
 - an effect with which its element hardly carries any more, such as a gap that hardly closes: no stiffness does as well;
 - an effect that, at its nominal size and beside the other one hidden, moves all that is recorded by less than 20
-  standard deviations of 1 g of noise (root of the sum of squares over both recordings);
+  standard deviations of 1 g of noise (root of the sum of squares over both recordings); of a driven channel's error,
+  what it makes of the channels of the bodies that it drives counts, not the channel itself, which no model predicts;
 - outside the vocabulary, what is less than 60 of these from the nearest effect inside, the mean of what changes: a
   mass that has grown before its body is pushed is an added mass.
 

@@ -6,6 +6,7 @@ constant held, the fit of all the others is smooth, and converges from the measu
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -14,7 +15,7 @@ from .fit import SLOWLY, Fit, fit
 from .layout import Addition, Layout
 from .records import Record
 
-STEP = 0.3
+STEP = 0.5
 """Of the constant's logarithm: a coarse look, a step beyond where the search starts on either side."""
 
 PRECISION = 1e-3
@@ -24,36 +25,48 @@ LEAST = 1e-9
 """Of a constant, in its unit: of a gap, nothing."""
 
 
-def profiled(
-    layout: Layout, records: Sequence[Record], addition: Addition, starts: Sequence[float], hopeless: float
-) -> Fit:
-    """The fit at the least of the profile over the addition's coefficient, which is positive.
+class Profile(NamedTuple):
+    """A coarse look at the profile over the coefficient of an addition, which is positive."""
 
-    starts: of the coefficient; hopeless: cost above which, after a coarse look, it is not worth a closer one.
-    """
+    addition: Addition
+    layout: Layout
+    coefficient: int
+    lowest: float  # logarithm of the least that is admitted
+    at: float  # logarithm of the coefficient where the cost is least
+    fit: Fit  # there
+
+
+def profile(layout: Layout, records: Sequence[Record], addition: Addition, starts: Sequence[float]) -> Profile:
+    """starts: of the coefficient; the look goes on beyond the largest as long as the cost falls."""
     coefficient = next(place.coefficient for place in layout.places if place.addition is addition)
     tried: dict[float, Fit] = {}
 
-    def coarsely(logarithm: float) -> float:
+    def cost(logarithm: float) -> float:
         start = layout.start.copy()
         start[coefficient] = np.exp(logarithm)
         tried[logarithm] = fit(layout._replace(start=start), records, held=(coefficient,))
         return tried[logarithm].cost
 
-    def closely(logarithm: float) -> float:
-        nearest = min(tried.values(), key=lambda one: one.cost)
-        start = nearest.theta.copy()
-        start[coefficient] = np.exp(logarithm)
-        tried[logarithm] = fit(layout, records, (start, nearest.trajectories), refine=SLOWLY, held=(coefficient,))
-        return min(tried[logarithm].cost, hopeless)
-
     lowest = np.log(max(layout.prior.low[coefficient], LEAST))
     low, high = max(np.log(min(starts)) - STEP, lowest), np.log(max(starts)) + STEP
-    best = min(np.linspace(low, high, 1 + int(np.ceil((high - low) / STEP))), key=coarsely)
-    while best == max(tried) and coarsely(best + STEP) < tried[best].cost:
+    best = min(np.linspace(low, high, 1 + int(np.ceil((high - low) / STEP))), key=cost)
+    while best == max(tried) and cost(best + STEP) < tried[best].cost:
         best = max(tried)
-    if tried[best].cost < hopeless:
-        bounds = max(best - STEP, lowest), best + STEP
-        minimize_scalar(closely, bounds=bounds, method="bounded", options={"xatol": PRECISION})
-    least = min(tried.values(), key=lambda one: one.cost)
-    return fit(layout, records, (least.theta, least.trajectories))
+    return Profile(addition, layout, coefficient, lowest, best, tried[best])
+
+
+def closer(look: Profile, records: Sequence[Record]) -> Fit:
+    """The fit at the least of the profile, then with the coefficient free."""
+    best = look.fit
+
+    def cost(logarithm: float) -> float:
+        nonlocal best
+        start = best.theta.copy()
+        start[look.coefficient] = np.exp(logarithm)
+        found = fit(look.layout, records, (start, best.trajectories), refine=SLOWLY, held=(look.coefficient,))
+        best = min(best, found, key=lambda one: one.cost)
+        return min(found.cost, 10.0 * look.fit.cost)  # finite
+
+    bounds = max(look.at - STEP, look.lowest), look.at + STEP
+    minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": PRECISION})
+    return fit(look.layout, records, (best.theta, best.trajectories))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..effects.base import AttachedBody, ChannelError, Effect
+from ..effects.base import AttachedBody, ChannelError, Effect, UnloadingSlope
 from .assess import assess
 from .candidates import candidates, touching
 from .fit import FADE, HOTTER, MOST_ITERATIONS, REFINE, SLOWLY, Fit, Stage, equation_error, fit
@@ -14,7 +14,7 @@ from .layout import Addition, Layout, make_layout
 from .model import Model
 from .motion import motion_of
 from .prior_odds import against_a_mass, against_a_share
-from .profile import profiled
+from .profile import closer, profile
 from .records import Record
 from .scales import Scales
 from .screening import Screened, changes_law, embedding, screen
@@ -40,7 +40,7 @@ SLOW = 3
 """Candidates that are then fitted on with more care."""
 
 MOST_PROFILES = 4
-"""Laws that are fitted over their constant."""
+"""Slopes on which an element may unload that are looked at over their value."""
 
 WORTH_FITTING = 1.0
 """Nats of a screened gain."""
@@ -135,16 +135,19 @@ class _Search:
             self._fit(replace(best, taken_from=None), None)
 
     def profile(self) -> None:
-        """Fit the laws that end a force otherwise than the model does, over the constant that says where."""
-        laws: dict[tuple[str, str], list[Addition]] = {}
+        """Fit the likeliest of the slopes on which an element may unload, which say when its force ends, over them."""
+        slopes: dict[tuple[str, str], list[Addition]] = {}
         for one in self.screened:
-            if changes_law(one.addition):
-                laws.setdefault(one.addition.key, []).append(one.addition)
-        model, scales = self.model, self.scales
-        for first, *others in list(laws.values())[:MOST_PROFILES]:
+            if isinstance(one.addition.effect, UnloadingSlope):
+                slopes.setdefault(one.addition.key, []).append(one.addition)
+        model, scales, looks = self.model, self.scales, []
+        for first, *others in list(slopes.values())[:MOST_PROFILES]:
             layout = make_layout(scales.structure, self.records, scales, [*model.additions, first], model.roughness)
             starts = [addition.coefficient for addition in (first, *others)]
-            self._note(first, profiled(layout, self.records, first, starts, model.fit.cost))
+            looks.append(profile(layout, self.records, first, starts))
+        best = min(looks, key=lambda look: look.fit.cost, default=None)
+        if best and best.fit.cost < model.fit.cost:
+            self._note(best.addition, closer(best, self.records))
 
     def slowly(self) -> None:
         """Fit the best ones on, with care for forces that jump."""
