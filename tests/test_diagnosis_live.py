@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,13 +10,18 @@ from helpers_diagnosis import hidden_case, so_far
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.core.diagnosis import live, live_candidates
+from crash_estimator.core.diagnosis.answer import ranking_of
 from crash_estimator.core.diagnosis.coarse import MOST_STEPS, coarsened
 from crash_estimator.core.diagnosis.diagnosis import diagnose
 from crash_estimator.core.diagnosis.fit import COARSE, CONVERGED
+from crash_estimator.core.diagnosis.layout import Addition
 from crash_estimator.core.diagnosis.live import LiveDiagnosis
 from crash_estimator.core.diagnosis.live_answer import LiveAnswer, final_answer
 from crash_estimator.core.diagnosis.live_candidates import ITERATIONS_ON
 from crash_estimator.core.diagnosis.records import make_record
+from crash_estimator.core.diagnosis.rounds import Round
+from crash_estimator.core.diagnosis.screening import Screened
+from crash_estimator.core.diagnosis.trying import Tried
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.structure import EffectSpec
 from crash_estimator.kept import Kept, Rows
@@ -264,3 +270,12 @@ def _reply(worker: Worker, ready: bool = False):
             return reply
         time.sleep(0.01)
     raise AssertionError("waited 60 s in vain for the process")
+
+
+def test_of_a_model_that_leaves_nothing_at_all_a_candidate_explains_nothing():
+    """So it can be for the first samples of a recording without noise: there is nothing to take a share of."""
+    addition = Addition(EFFECTS["added_mass"], "car")
+    tried = Tried(addition, 3.0, None, Screened(addition, 3.0, 10.0, 5.0))
+    round_ = Round(SimpleNamespace(fit=SimpleNamespace(cost=0.0)), [tried])
+    (ranked,) = ranking_of(round_, 1)
+    assert ranked.name == "added_mass on car" and ranked.explained == 0.0

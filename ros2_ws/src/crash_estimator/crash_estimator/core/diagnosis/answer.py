@@ -113,7 +113,7 @@ def _ranked(tried: Tried, round_: Round, shown: list[Tried]) -> Ranked:
     rivals = tuple(" on ".join(other.addition.key) for other in fitted if _confounded(tried, other))
     before = round_.before.fit.cost
     if tried.fit is None:
-        explained = min(max(2.0 * tried.gain / before, 0.0), 1.0)
+        explained = min(max(2.0 * tried.gain / before, 0.0), 1.0) if before > 0.0 else 0.0
         screened = tried.screened
         value, std, shape = screened.coefficient, screened.std, dict(tried.addition.shapes)
         if tried.addition.coefficient is not None:

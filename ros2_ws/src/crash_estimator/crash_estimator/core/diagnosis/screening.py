@@ -22,7 +22,7 @@ from ..effects.base import Gap, UnloadingSlope
 from .fit import Fit, equation_error_start, solve
 from .layout import Addition, Layout, Link, make_layout
 from .motion import motion_of
-from .normal import normal_equations
+from .normal import may_diverge, normal_equations
 from .records import DRIVEN_MODES, Record
 from .scales import Scales
 
@@ -38,6 +38,7 @@ def changes_law(addition: Addition) -> bool:
     return isinstance(addition.effect, (Gap, UnloadingSlope))
 
 
+@may_diverge
 def screen(
     records: Sequence[Record], scales: Scales, present: Sequence[Addition], additions: Sequence[Addition],
     roughness=None, fitted: Fit | None = None,
