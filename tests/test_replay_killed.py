@@ -63,7 +63,7 @@ def test_one_that_is_killed_counts_for_none_that_is_still_to_come(bag, listener)
             wait_until(lambda: listener.states[-1].subscribers == 1)
             there = listener.node.get_subscriptions_info_by_topic("samples")
             if "mortal" not in [endpoint.node_name for endpoint in there]:
-                pytest.skip("the middleware has forgotten it already: this machine stood still for as long as its lease")
+                pytest.skip("the middleware has forgotten it already: the machine stood still for its lease")
     finally:
         mortal.kill()
         mortal.wait()
