@@ -102,16 +102,21 @@ def test_an_effect_too_small_to_show_is_drawn_again():
 
 
 def test_a_driven_channel_is_wrong_only_where_what_it_drives_shows_it():
-    """Most moves the channel itself, but a model is driven by it: the others are what it predicts."""
+    """Most moves the channel itself, but a model is driven by it: the others are what it predicts. What a free curve
+    between them takes in does not show, either: told what the curves are, it does."""
     bare = draw_case("dummy", (), 3).specimen
     beside_the_car = [e.name for e in bare.scenario.system.elements if "car" in e.between]
-    loose = bare
+    loose, known = bare, {name: entry | {"stiffness": 1e5} for name, entry in bare.model["elements"].items()}
     for name in beside_the_car:
         loose = loose.with_law(name, curve=straight(1.0), damping=0.0)
-    for specimen, told in ((bare, True), (loose, False)):
-        wrong = specimen.with_sensor("car_ay", distortion=lambda time, signal: 1.2 * signal)
+    assert all(bare.told(name) == "curve" for name in beside_the_car)
+    told = replace(bare, model={**bare.model, "elements": known})
+    for specimen, channel, seen in (
+        (loose, "car_ay", False), (bare, "car_ay", False), (told, "car_ay", True), (bare, "door_lower_ay", True),
+    ):  # fmt: skip
+        wrong = specimen.with_sensor(channel, distortion=lambda time, signal: 1.2 * signal)
         assert distance(specimen, wrong) > SHOWS
-        assert shows(specimen, "channel_gain", "car_ay", wrong) == told
+        assert shows(specimen, "channel_gain", channel, wrong) == seen
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """The words of docs/missing-effects.md."""
 
+from .effects_plan import SEEDS
+
 HEAD = """\
 # Which missing effect is found, and how surely
 
@@ -36,7 +38,8 @@ search, and the structure is then drawn anew
 - an effect with which its element hardly carries any more, such as a gap that hardly closes: no stiffness does as well;
 - an effect that, at its nominal size and beside the other one hidden, moves all that is recorded by less than 20
   standard deviations of 1 g of noise (root of the sum of squares over both recordings); of a driven channel's error,
-  what it makes of the channels of the bodies that it drives counts, not the channel itself, which no model predicts;
+  what it makes of the channels of the bodies that it drives counts, not the channel itself, which no model predicts,
+  and 15 of these must be left when the laws that the model leaves free have taken in what they can;
 - outside the vocabulary, what is less than 60 of these from the nearest effect inside, the mean of what changes: a
   mass that has grown before its body is pushed is an added mass.
 
@@ -45,7 +48,7 @@ no stiffness and a stop of its stiffness where the gap closes. `bottoming_out` o
 `clearance` therefore counts as right where its stop is within 5 % of the gap. A `load_path` from a to b is one from b
 to a.
 
-Seeds of these cases start at 6 000 000; nothing was developed on them."""
+Seeds of these cases start at {seeds}; nothing was developed on them.""".format(seeds=f"{SEEDS:,}".replace(",", " "))
 
 NOT_RIGHT = """\
 Every one at nominal size, 0.5 to 2 g and 10 kHz, of one recording (`/1.1/` in its name) or two; the name makes it

@@ -19,8 +19,9 @@ from .rounds import Round
 from .temper import CFC, SLOWEST
 from .trying import GAIN, Tried
 
-CONFOUNDED = 6.0
-"""Nats: evidences closer than this do not tell two candidates apart."""
+CONFOUNDED = 10.0
+"""Nats: evidences closer than this do not tell two candidates apart. That is more than the GAIN by which something is
+found: Laplace's approximation and the priors of two different laws leave some nats open between them."""
 
 ACTS = 0.05
 """A barrier's force and inertias are compared while the force is above this share of its peak."""

@@ -11,10 +11,11 @@ from ..effects.base import Effect
 from ..structure import ModelError, Structure
 from .additions import additions_of, structure_with
 from .answer import Ranked, StepReport, ranking_of, step_of
-from .assess import assess, free_run, noise_floor
+from .assess import Left, assess, free_run, noise_floor
 from .constancy import Drift, drift_of
 from .fit import Fit, fit
 from .helpful import helpful
+from .layout import Addition
 from .misfit import MisfitWindow, misfit_windows
 from .model import Model, fit_model
 from .records import Record, make_record
@@ -127,18 +128,35 @@ def _found(
     rounds, final = search(records, scales, effects, present)
     as_recorded = _in_the_sensors_noise(final, records)
     left = assess(as_recorded, records)
-    if not final.left.whiteness.white and left.cost < NEAR_THE_FLOOR:
-        finer = make_scales(structure, records, FINER_CELLS, pulls=pulls)
-        refined = fit_model(structure, records, finer, final.additions)
-        if refined.left.whiteness.white or share_removed(left, refined.left) > LEAST_SHARE:
-            finer_rounds, finer_final = search(records, finer, effects, present)
-            if finer_final.left.whiteness.white:
-                scales, rounds, final = finer, finer_rounds, finer_final
-                as_recorded = _in_the_sensors_noise(final, records)
+    finer = make_scales(structure, records, FINER_CELLS, pulls=pulls)
+    if _wants_finer_curves(final, left, finer, len(present)):
+        finer_rounds, finer_final = search(records, finer, effects, present)
+        fewer = len(finer_final.additions) < len(final.additions) or not final.left.whiteness.white
+        if finer_final.left.whiteness.white and fewer:
+            scales, rounds, final = finer, finer_rounds, finer_final
+            as_recorded = _in_the_sensors_noise(final, records)
     rounds, told = helpful(rounds, final, len(present))
     if told is not final:
         final, as_recorded = told, _in_the_sensors_noise(told, records)
     return _Found(scales, rounds, final, len(present), as_recorded)
+
+
+def _wants_finer_curves(final: Model, left: Left, finer: Scales, present: int) -> bool:
+    """Whether folds of a curve that its cells are too wide for may be what is left, or what several effects stand for.
+
+    left: by the final model in the sensors' noise.
+    """
+
+    def refined(additions: Sequence[Addition]) -> Left:
+        return fit_model(finer.structure, finer.records, finer, additions).left
+
+    given, found = final.additions[:present], final.additions[present:]
+    if len(found) > 1 and any(refined((*given, one)).whiteness.white for one in found):
+        return True
+    if final.left.whiteness.white or left.cost >= NEAR_THE_FLOOR:
+        return False
+    sharper = refined(final.additions)
+    return sharper.whiteness.white or share_removed(left, sharper) > LEAST_SHARE
 
 
 def _in_the_sensors_noise(model: Model, records: Sequence[Record]) -> Fit:
@@ -175,4 +193,3 @@ def _answer(structure: Structure, found: _Found, drift: Drift) -> Diagnosis:
         structure=structure_with(structure, added, steps),
         models=models,
     )
-

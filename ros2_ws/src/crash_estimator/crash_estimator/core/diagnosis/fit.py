@@ -27,10 +27,16 @@ FADE = (Stage(200.0, 30.0, 16.0), Stage(80.0, 10.0, 8.0), Stage(30.0, 3.0, 4.0),
 
 A force that jumps at separation is felt by the fit only while it jumps: blurred, it is drawn to the right instant."""
 
-HOTTER = tuple(stage._replace(inflate=10.0 * stage.inflate) for stage in FADE)
-"""Where that has led nowhere: less is believed at first, so that less is fitted to a motion that is still wrong."""
+GRADUALLY = (
+    *(Stage(pull, 1.5 * pull, blur) for pull, blur in zip(np.geomspace(200.0, 3.0, 16), np.geomspace(16.0, 2.0, 16))),
+    Stage(0.0, 2.0, 6.0),
+    Stage(0.0, 1.0, 2.0),
+)
+"""Where that has led nowhere, as a light body between stiff elements may: the observer is let go in small steps, and
+less is believed at first, so that less is fitted to a motion that is still wrong."""
 
 HOTTEST = tuple(stage._replace(inflate=100.0 * stage.inflate) for stage in FADE)
+"""Where not even that leads anywhere, as with a measured motion that errs by far."""
 
 REFINE = (Stage(0.0, 2.0, 6.0), Stage(0.0, 1.0, 2.0))
 """Stages of a fit that starts from a simulation."""
@@ -186,10 +192,12 @@ def fit(
 ) -> Fit:  # fmt: skip
     """Fit from the measured motion, or from given parameters and trajectories.
 
-    hopeless: cost above which, after LEAST iterations, it is not worth going on; refine: stages before the free run,
-    FADE where none are given and the fit starts from the measured motion; held: parameters that stay as they start.
+    hopeless: cost above which, after LEAST iterations, it is not worth going on; most: iterations, of which FADE's
+    stages are some, and further ones are not; refine: stages before the free run, FADE where none are given and the
+    fit starts from the measured motion; held: parameters that stay as they start.
     """
     stages = list(refine or (() if start else FADE))
+    most += max(len(stages) - len(FADE), 0)
     point = _Point(*(start or equation_error_start(layout, records, held)))
     shapes, stays = shape_parameters(layout), np.isin(np.arange(layout.size), held)
     kept: tuple[_Point, Step] | None = None

@@ -8,7 +8,7 @@ import numpy as np
 from ..structure import Structure
 from .assess import Left, assess
 from .curves import adapted_roughness
-from .fit import HOTTER, HOTTEST, MOST_ITERATIONS, SLOWLY, Fit, fit
+from .fit import GRADUALLY, HOTTEST, MOST_ITERATIONS, SLOWLY, Fit, fit
 from .layout import Addition, Layout, make_layout
 from .records import Record
 from .scales import Scales
@@ -32,7 +32,7 @@ def fit_model(
     layout = make_layout(structure, records, scales, additions)
     found = fit(layout, records, (start.theta, start.trajectories) if start else None)
     if not found.cost < cost_of_nothing(records):
-        found = fit(layout, records, refine=HOTTER)
+        found = fit(layout, records, refine=GRADUALLY)
     roughness = {
         link.name: adapted_roughness(link.curve, found.theta) for link in layout.links if link.curve is not None
     }
@@ -45,7 +45,7 @@ def fit_model(
         if slower.evidence > found.evidence:
             found, left = slower, assess(slower, records, sharply=True)
     if records[0].mix is None and not settled(found, left):
-        others = [fit(layout, records, refine=stages) for stages in (HOTTER, HOTTEST)]
+        others = [fit(layout, records, refine=stages) for stages in (GRADUALLY, HOTTEST)]
         for other in others:
             there = assess(other, records, sharply=True)
             if there.cost < left.cost:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from .fit import SLOWLY, Fit, fit
+from .fit import GRADUALLY, SLOWLY, Fit, fit
 from .layout import Addition, Layout
 from .records import Record
 
@@ -44,7 +44,7 @@ def profile(layout: Layout, records: Sequence[Record], addition: Addition, start
     def cost(logarithm: float) -> float:
         start = layout.start.copy()
         start[coefficient] = np.exp(logarithm)
-        tried[logarithm] = fit(layout._replace(start=start), records, held=(coefficient,))
+        tried[logarithm] = fit(layout._replace(start=start), records, refine=GRADUALLY, held=(coefficient,))
         return tried[logarithm].cost
 
     lowest = np.log(max(layout.prior.low[coefficient], LEAST))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..effects.base import ChannelError, Effect
 from .assess import Left, assess
-from .fit import HOTTER, REFINE, Fit, fit
+from .fit import GRADUALLY, HOTTEST, REFINE, Fit, fit
 from .layout import Addition, Layout
 from .model import Model, fit_model
 from .motion import motion_of
@@ -53,7 +53,7 @@ def one_round(records: Sequence[Record], scales: Scales, effects: Mapping[str, E
             there = fit(model.fit.layout, records, (before.fit.theta, before.fit.trajectories))
             decided = assess(there, records, sharply=True).whiteness
             before = before._replace(left=before.left._replace(whiteness=decided))
-        done = Round(before, try_candidates(noisier, scales, effects, before), tried)
+        done = Round(before, try_candidates(noisier, scales, effects, before, known=tried), tried)
     return done
 
 
@@ -94,9 +94,11 @@ def added(records: Sequence[Record], scales: Scales, model: Model, best: Tried) 
         model = fit_model(scales.structure, records, scales, additions, start)
         if model.left.whiteness.white:
             return scales, model
-        anew = fit(model.fit.layout, records, refine=HOTTER)  # the usual stages may have led astray
-        anew = model._replace(fit=anew, left=assess(anew, records, sharply=True))
-        return scales, anew if better(anew, model) else model
+        for stages in (GRADUALLY, HOTTEST):  # the usual ones may have led astray
+            anew = fit(model.fit.layout, records, refine=stages)
+            anew = model._replace(fit=anew, left=assess(anew, records, sharply=True))
+            model = anew if better(anew, model) else model
+        return scales, model
 
     if not isinstance(best.addition.effect, ChannelError):
         return fitted(scales, best.fit)

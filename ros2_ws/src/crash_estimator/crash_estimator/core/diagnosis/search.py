@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from ..effects.base import Effect
 from .assess import assess
-from .fit import HOTTER, fit
+from .fit import GRADUALLY, fit
 from .layout import Addition, make_layout
 from .model import Model, fit_model
 from .records import Record
@@ -89,7 +89,7 @@ def _refitted(scales: Scales, records: Sequence[Record], additions: Sequence[Add
     and, as it may have been led astray, from the measured motion."""
     layout = make_layout(scales.structure, records, scales, additions, like.roughness)
     from_there = narrowed(layout, like.fit, records)
-    fits = (fit(layout, records, from_there), fit(layout, records), fit(layout, records, refine=HOTTER))
+    fits = (fit(layout, records, from_there), fit(layout, records), fit(layout, records, refine=GRADUALLY))
     found = max(fits, key=lambda one: one.evidence)
     return Model(tuple(additions), found, assess(found, records, sharply=True), like.roughness, records)
 

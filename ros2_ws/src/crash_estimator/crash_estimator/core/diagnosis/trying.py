@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..effects.base import AttachedBody, ChannelError, Effect, UnloadingSlope
+from ..effects.base import AttachedBody, ChannelError, Effect, PairSpring, UnloadingSlope
 from .assess import assess
 from .candidates import candidates, touching
-from .fit import FADE, HOTTER, MOST_ITERATIONS, REFINE, SLOWLY, Fit, Stage, equation_error, fit
+from .fit import FADE, GRADUALLY, HOTTEST, MOST_ITERATIONS, REFINE, SLOWLY, Fit, Stage, equation_error, fit
 from .layout import Addition, Layout, make_layout
 from .model import Model
 from .motion import motion_of
@@ -62,11 +62,13 @@ class Tried(NamedTuple):
 
 
 def try_candidates(
-    records: Sequence[Record], scales: Scales, effects: Mapping[str, Effect], model: Model, thorough: bool = False
-) -> list[Tried]:
+    records: Sequence[Record], scales: Scales, effects: Mapping[str, Effect], model: Model, thorough: bool = False,
+    known: Sequence[Tried] = (),
+) -> list[Tried]:  # fmt: skip
     """All candidates for one more addition, best first; one for each effect and target.
 
-    thorough: try more of them, and harder, where none of the most likely ones leaves white noise.
+    thorough: try more of them, and harder, where none of the most likely ones leaves white noise. known: what was
+    found in another noise, best first; its best fits are taken up.
     """
     additions = candidates(scales.structure, scales, effects, model.additions)
     by_fit = screen(records, scales, model.additions, additions, model.roughness, model.fit)
@@ -77,19 +79,22 @@ def try_candidates(
     search = _Search(records, scales, model, by_fit)
     search.from_motion(shortlist(by_motion, SHORTLIST))
     search.from_model(shortlist(worth, SHORTLIST))
+    search.taken_up([tried for tried in known if tried.fit][:SHORTLIST])
     if thorough and model.left.cost < NEAR_THE_FLOOR:
         search.from_motion(Screened(a, 0.0, 0.0, 1.0) for a in additions if _bends_driven_motion(scales, a))
     if thorough and not model.left.whiteness.white:
         offsets = [a for a in additions if isinstance(a.effect, ChannelError) and a.effect.role == "offset"]
         for harder in (
             search.slowly,
+            search.other_ways,
+            lambda: search.anew(GRADUALLY),
+            lambda: search.from_motion(shortlist(by_motion, SHORTLIST) + shortlist(worth, SHORTLIST), GRADUALLY),
             lambda: search.from_model(shortlist(by_motion, SHORTLIST) + shortlist(worth, LONG_LIST)),
             lambda: search.from_motion(shortlist(worth, SHORTLIST) + shortlist(by_motion, LONG_LIST)),
             search.profile,
             lambda: search.from_motion([start for a in offsets for start in offset_starts(records, scales, model, a)]),
             search.slowly,
-            search.hotter,
-            lambda: search.from_motion(shortlist(by_motion, SHORTLIST) + shortlist(worth, SHORTLIST), HOTTER),
+            lambda: search.anew(HOTTEST),
         ):
             if search.reached_the_floor():
                 break
@@ -121,6 +126,18 @@ class _Search:
         for one in chosen:
             self._fit(one.addition, one)
 
+    def taken_up(self, known: Iterable[Tried]) -> None:
+        """Fit candidates from where their fits in another noise have ended."""
+        for one in known:
+            layout = self._layout(one.addition)
+            self._note(one.addition, fit(layout, self.records, (one.fit.theta, one.fit.trajectories)))
+
+    def other_ways(self) -> None:
+        """Fit the best load paths in the other ways in which they may carry."""
+        best = {t.addition.key for t in [t for t in self.ranking() if t.fit][:SLOW]}
+        ways = [one for one in self.screened if isinstance(one.addition.effect, PairSpring)]
+        self.from_motion(one for one in ways if one.addition.key in best)
+
     def _touching(self, addition: Addition) -> None:
         """What an unmodelled body pushes: the rest of its balance may go to any of the bodies that it may touch."""
         hosts: dict[str, Addition] = {addition.host: addition}
@@ -140,13 +157,12 @@ class _Search:
         for one in self.screened:
             if isinstance(one.addition.effect, UnloadingSlope):
                 slopes.setdefault(one.addition.key, []).append(one.addition)
-        model, scales, looks = self.model, self.scales, []
+        looks = []
         for first, *others in list(slopes.values())[:MOST_PROFILES]:
-            layout = make_layout(scales.structure, self.records, scales, [*model.additions, first], model.roughness)
             starts = [addition.coefficient for addition in (first, *others)]
-            looks.append(profile(layout, self.records, first, starts))
+            looks.append(profile(self._layout(first), self.records, first, starts))
         best = min(looks, key=lambda look: look.fit.cost, default=None)
-        if best and best.fit.cost < model.fit.cost:
+        if best and best.fit.cost < self.model.fit.cost:
             self._note(best.addition, closer(best, self.records))
 
     def slowly(self) -> None:
@@ -157,18 +173,17 @@ class _Search:
                 tried.addition, fit(tried.fit.layout, self.records, start, refine=SLOWLY, most=2 * MOST_ITERATIONS)
             )
 
-    def hotter(self) -> None:
-        """Fit the best ones from the measured motion, which less is believed of."""
+    def anew(self, stages: Sequence[Stage]) -> None:
+        """Fit the best ones from the measured motion by other stages."""
         for tried in [t for t in self.ranking() if t.fit][:SLOW]:
-            self._fit(tried.addition, None, HOTTER)
+            self._fit(tried.addition, None, stages)
 
     def _fit(self, addition: Addition, screened: Screened | None, stages: Sequence[Stage] = FADE) -> None:
         stages = REFINE if screened else stages
         if (id(addition), stages) in self.done:
             return
         self.done.add((id(addition), stages))
-        model, scales = self.model, self.scales
-        layout = make_layout(scales.structure, self.records, scales, [*model.additions, addition], model.roughness)
+        layout = self._layout(addition)
         start = self._start(layout, addition, screened) if screened else None
         self._note(addition, fit(layout, self.records, start, self.least + HOPELESS, refine=stages))
 
@@ -182,6 +197,10 @@ class _Search:
             or gain - against_a_share(addition) > before.gain - against_a_share(before.addition)
         ):
             self.found[addition.key] = Tried(addition, gain, found, None)
+
+    def _layout(self, addition: Addition) -> Layout:
+        model, scales = self.model, self.scales
+        return make_layout(scales.structure, self.records, scales, [*model.additions, addition], model.roughness)
 
     def _start(self, layout: Layout, addition: Addition, screened: Screened) -> tuple[np.ndarray, list[Trajectory]]:
         theta = layout.start.copy()
@@ -211,7 +230,7 @@ class _Search:
 
 
 def offset_starts(records: Sequence[Record], scales: Scales, model: Model, addition: Addition) -> list[Screened]:
-    """The offset at the values with which the forces along the measured motion fit best."""
+    """No offset yet, and the values with which the forces along the measured motion fit best."""
     low, high = addition.effect.low, addition.effect.high
     step = (high - low) / OFFSETS
     shifted = [replace(addition, coefficient=low + step * (k + 0.5)) for k in range(OFFSETS)]
@@ -220,7 +239,8 @@ def offset_starts(records: Sequence[Record], scales: Scales, model: Model, addit
         layout = make_layout(scales.structure, records, scales, [*model.additions, one], model.roughness)
         return equation_error(layout, records)
 
-    return [Screened(one, 0.0, one.coefficient, 1.0) for one in sorted(shifted, key=misfit)[:OFFSET_STARTS]]
+    starts = [addition, *sorted(shifted, key=misfit)[:OFFSET_STARTS]]
+    return [Screened(one, 0.0, one.coefficient or 0.0, 1.0) for one in starts]
 
 
 def _bends_driven_motion(scales: Scales, addition: Addition) -> bool:
