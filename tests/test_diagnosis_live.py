@@ -111,6 +111,17 @@ def test_misfit_and_curves_are_of_the_samples_so_far(damped, said):
         assert_allclose(np.sqrt(np.mean(residual[:, ~force] ** 2)), answer.rms.before, rtol=0.3)
 
 
+@pytest.mark.parametrize("end", [0.0007, 0.0011, 0.0016])
+def test_a_misfit_is_told_before_the_test_is_as_long_as_its_window(damped, end):
+    _, model, recording = damped
+    shaking = 500.0 * np.where(np.arange(len(recording.values)) % 40 < 20, 1.0, -1.0)[:, None]
+    at_50_khz = replace(recording, time_ns=recording.time_ns // 5, values=recording.values + shaking)
+    shaken = so_far(at_50_khz, end)
+    diagnosis = LiveDiagnosis(model, shaken.test, budget=np.inf)
+    _, answer = diagnosis.update(diagnosis.init(), shaken)
+    assert answer.misfit and all(0.0 <= window.start <= window.end <= end for window in answer.misfit)
+
+
 def test_the_last_one_is_the_offline_answer_itself(damped):
     offline = diagnose(damped[1], [damped[2]])
     answer = final_answer(offline)

@@ -175,6 +175,29 @@ def test_the_picture_shows_bodies_and_coloured_springs(picture):
     assert springs.sum() > 500  # compressed: yellow to orange
 
 
+def test_a_viewer_that_answers_and_then_stops_is_an_error_that_says_what_it_said(rrd, tmp_path, monkeypatch):
+    """As where there is no graphics library."""
+    viewer, has_said = tmp_path / "viewer", tmp_path / "has_said"
+    panic = "thread 'main' panicked at 'no context'"
+    viewer.write_text(f'#!/bin/sh\necho "{panic}" >&2\necho "0: stack" >&2\ntouch {has_said}\nexec sleep 60\n')
+    viewer.chmod(0o755)
+
+    class Gone:
+        connect = classmethod(lambda cls, url: cls())
+
+        def get_state(self):
+            if not has_said.exists():
+                raise ConnectionError("not yet")
+
+        def open(self, path):
+            raise ConnectionError("transport error")
+
+    monkeypatch.setattr("crash_estimator.viewer.screenshot.viewer_binary", lambda: str(viewer))
+    monkeypatch.setattr("crash_estimator.viewer.screenshot.ViewerClient", Gone)
+    with pytest.raises(ScreenshotError, match=f"stopped, saying: {panic} "):
+        screenshot(rrd, tmp_path / "crash.png")
+
+
 def test_the_screenshot_command(rrd, tmp_path, capsys):
     assert main([str(tmp_path / "none.rrd"), "x.png"]) == 1
     assert capsys.readouterr().err == f"error: {tmp_path / 'none.rrd'}: no such recording\n"

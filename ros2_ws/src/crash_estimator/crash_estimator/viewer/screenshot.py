@@ -45,28 +45,27 @@ def screenshot(
         f"--window-size={size[0]}x{size[1]}",
         "--bind=127.0.0.1",
         f"--port={port}",
+        "--hide-welcome-screen",
     ]
     quiet = {**os.environ, "RUST_LOG": "error", "RERUN_APP_ONLY": "true"}  # messages would pop up in the picture
-    process = subprocess.Popen(
-        [*command, "--hide-welcome-screen"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=quiet
-    )
-    try:
-        viewer = _connected(process, f"rerun+http://127.0.0.1:{port}/proxy", time.monotonic() + patience)
-        viewer.open(str(rrd))
-        _wait_until_loaded(viewer, time.monotonic() + patience)
-        if at is not None:
-            viewer.set_time(TIMELINE, duration=at, play_state="paused")
-        png.write_bytes(_settled_picture(viewer, time.monotonic() + patience))
-    finally:
-        process.terminate()
-        process.communicate()
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=quiet) as process:
+        try:
+            viewer = _connected(process, f"rerun+http://127.0.0.1:{port}/proxy", time.monotonic() + patience)
+            viewer.open(str(rrd))
+            _wait_until_loaded(viewer, time.monotonic() + patience)
+            if at is not None:
+                viewer.set_time(TIMELINE, duration=at, play_state="paused")
+            png.write_bytes(_settled_picture(viewer, time.monotonic() + patience))
+        except ConnectionError as error:  # it had answered: where it cannot draw it stops a moment later
+            raise _stopped(process) from error
+        finally:
+            process.terminate()
 
 
 def _connected(process: subprocess.Popen, url: str, deadline: float) -> ViewerClient:
     while time.monotonic() < deadline:
         if process.poll() is not None:
-            said = (process.stderr.read().decode(errors="replace").strip().splitlines() or ["nothing"])[-1]
-            raise ScreenshotError(f"the Rerun viewer stopped, saying: {said} (it needs: apt install {LIBRARIES})")
+            raise _stopped(process)
         try:
             viewer = ViewerClient.connect(url)
             viewer.get_state()
@@ -74,6 +73,14 @@ def _connected(process: subprocess.Popen, url: str, deadline: float) -> ViewerCl
         except ConnectionError:
             time.sleep(0.1)
     raise ScreenshotError(f"the Rerun viewer did not answer at {url}")
+
+
+def _stopped(process: subprocess.Popen) -> ScreenshotError:
+    """With what it said of its end, which stands before its stack and its addresses for help."""
+    process.terminate()
+    said = process.stderr.read().decode(errors="replace").strip().splitlines() or ["nothing"]
+    reason = next((line for line in said if "panicked" in line or "error" in line.lower()), said[-1]).strip()
+    return ScreenshotError(f"the Rerun viewer stopped, saying: {reason} (it needs: apt install {LIBRARIES})")
 
 
 def _wait_until_loaded(viewer: ViewerClient, deadline: float) -> None:
