@@ -67,8 +67,8 @@ def assess(fitted: Fit, records: Sequence[Record], sharply: bool = False) -> Lef
 
 def _absorbed(fitted: Fit, record: Record, r: int, equations: Equations) -> list[Absorbed]:
     """One for each output."""
-    residual, jacobian = whitened(fitted.layout, record, r, fitted.theta, fitted.trajectories[r], equations)
-    columns = equations.columns
+    out = whitened(fitted.layout, record, r, fitted.theta, fitted.trajectories[r], equations)
+    residual, jacobian, columns = out[:, :, 0], out[:, :, 1:], equations.columns
     covariance = fitted.covariance[np.ix_(columns, columns)]
     std = np.sqrt(np.diagonal(covariance))  # of units that differ by many orders of magnitude
     values, vectors = np.linalg.eigh(covariance / np.outer(std, std))

@@ -5,7 +5,7 @@ A mean over a bin is a sample with less noise, at the bin's centre; what is fast
 
 import numpy as np
 
-from .records import Record, Signal, cosines_of
+from .records import Record, Signal, cosines_of, on_grid
 
 STEP = 5e-4
 """s: the linear-acceleration step's phase error, (omega dt)^2 / 24, is 4e-4 for the stiffest contact, 200 rad/s."""
@@ -36,6 +36,7 @@ def coarsened(record: Record) -> Record:
         at=np.arange(1, bins + 1),
         period=float(np.median(np.diff(centre))),
         measured=mean,
+        on_grid=on_grid(grid, np.arange(1, bins + 1), mean),
         noise=record.noise / np.sqrt(per_bin),
         signals={name: _coarsened(signal, used, per_bin, grid) for name, signal in record.signals.items()},
         bin=bin_,
@@ -47,4 +48,5 @@ def coarsened(record: Record) -> Record:
 
 def _coarsened(signal: Signal, used: int, per_bin: int, grid: np.ndarray) -> Signal:
     means = signal.values[-used:].reshape(-1, per_bin).mean(axis=1)
-    return signal._replace(time=grid, values=np.concatenate([means[:1], means]), noise=signal.noise / np.sqrt(per_bin))
+    values = np.concatenate([means[:1], means])
+    return signal._replace(time=grid, values=values, on_grid=values, noise=signal.noise / np.sqrt(per_bin))

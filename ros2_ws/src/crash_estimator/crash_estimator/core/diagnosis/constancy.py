@@ -107,14 +107,15 @@ def _normal_equations(fitted: Fit, records: Sequence[Record], free: Sequence[int
         at = fitted.theta, fitted.trajectories[r]
         modes = np.cos(np.pi * np.arange(1, MODES + 1) * (record.time / longest)[:, None])
         equations = _with_motion(linearise(layout, record, r, *at), modes, free, layout.size)
-        residual, jacobian = whitened(layout, record, r, *at, equations)
-        flat = np.concatenate([jacobian, _of_sensors(fitted, record, r, equations, modes)], axis=2)
-        flat, residual = flat.reshape(residual.size, -1), residual.ravel()
+        out = whitened(layout, record, r, *at, equations)
+        flat = np.concatenate([out, _of_sensors(fitted, record, r, equations, modes)], axis=2)
+        flat = flat.reshape(-1, flat.shape[-1])
+        products = flat.T @ flat
         c = np.concatenate([equations.columns, size + np.arange(-len(layout.outputs) * MODES, 0)])
-        matrix[np.ix_(c, c)] += flat.T @ flat
-        vector[c] += flat.T @ residual
-        cost += float(residual @ residual)
-        samples += residual.size
+        matrix[np.ix_(c, c)] += products[1:, 1:]
+        vector[c] += products[0, 1:]
+        cost += float(products[0, 0])
+        samples += len(flat)
     return Normal(matrix, vector, cost, samples, 0.0)
 
 

@@ -1,8 +1,10 @@
 """Which physical effect is missing: the answer, from a structure and one or more recordings of it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
+
+import numpy as np
 
 from crash_replay.recording import Recording
 
@@ -16,6 +18,7 @@ from .constancy import Drift, drift_of
 from .fit import Fit, fit
 from .helpful import helpful
 from .layout import Addition
+from .linearise import linearise
 from .misfit import MisfitWindow, misfit_windows
 from .model import Model, fit_model
 from .records import Record, make_record
@@ -111,13 +114,27 @@ class _Found(NamedTuple):
             return False
         never = make_scales(structure, records, self.scales.cells, pulls=False)
         samples = sum(record.bins * record.measured.shape[1] for record in records)
-        for model in (*(round_.before for round_ in self.rounds), final):
+        models = [round_.before for round_ in self.rounds]
+        for model in models if models[-1] is final else [*models, final]:
             pulling = _in_the_sensors_noise(model, records)
+            if not _contacts_pull(pulling, records):
+                continue
             pushing = fit_model(structure, records, never, model.additions).fit
             misfit = 0.5 * max(pulling.cost - samples, 0.0)  # nats
             if pushing.evidence > pulling.evidence + GAIN + LEAST_SHARE * misfit:
                 return True
         return False
+
+
+def _contacts_pull(fitted: Fit, records: Sequence[Record]) -> bool:
+    """Whether any does along the fitted motion; where none does, one that never pulls is the same."""
+    layout = fitted.layout
+    never = layout._replace(links=tuple(replace(link, pulls=False) for link in layout.links))
+    for r, (record, trajectory) in enumerate(zip(records, fitted.trajectories)):
+        rows = [linearise(each, record, r, fitted.theta, trajectory).rows for each in (layout, never)]
+        if not np.array_equal(*rows):
+            return True
+    return False
 
 
 def _found(

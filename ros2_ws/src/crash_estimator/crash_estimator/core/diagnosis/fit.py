@@ -17,7 +17,7 @@ from .layout import Layout
 from .linearise import Equations
 from .motion import measured_motion, motion_of
 from .normal import FREE_RUN, Normal, Stage, may_diverge, normal_equations
-from .propagate import propagate
+from .propagate import respond
 from .records import Record
 from .trajectory import Trajectory
 
@@ -46,7 +46,7 @@ SLOWLY = tuple(Stage(0.0, 1.0, blur) for blur in (8.0, 8.0, 8.0, 4.0, 4.0, 4.0, 
 
 
 MOST_ITERATIONS = 20
-LEAST = 6
+LEAST = 5
 MOST_HALVINGS = 5
 LONGEST_SHAPE_STEP = 0.35
 """Of the logarithm of a shape constant in one iteration."""
@@ -56,6 +56,9 @@ CONVERGED = 0.1
 
 COARSE = 1e-3
 """... or as a share of what the cost exceeds that of a fit at the noise floor by: a misfit needs no precision."""
+
+CIRCLES = 4
+"""Iterations in which the cost finds no new least by as much: it goes around a kink of the forces."""
 
 
 RIDGE = 1e-8
@@ -104,8 +107,9 @@ def solve(
     delta = np.zeros(layout.size)
     for _ in range(8):
         free = ~held
-        target = vector - matrix[:, held] @ delta[held]
-        small = matrix[np.ix_(free, free)] * np.outer(scale[free], scale[free])
+        target = vector - matrix @ np.where(held, delta, 0.0)
+        kept = np.flatnonzero(free)
+        small = matrix.take(kept, 0).take(kept, 1) * scale[kept] * scale[kept, None]
         factor = _cholesky(small)
         delta[free] = scale[free] * cho_solve(factor, scale[free] * target[free], check_finite=False)
         outside = free & ((delta < low - 1e-12 * np.abs(low)) | (delta > high + 1e-12 * np.abs(high)))
@@ -130,19 +134,8 @@ def advance(
     layout: Layout, record: Record, r: int, theta, delta, trajectory: Trajectory, equations: Equations
 ) -> Trajectory:
     """The trajectory of theta + delta, to first order."""
-    linear = equations.linear
-    change = np.append(1.0, delta[equations.columns])[linear.column]
-    bodies = np.arange(len(layout.bodies))
-    acts = np.where(linear.body == bodies[:, None], change, 0.0) @ linear.acts  # (b, g)
-    push = (linear.weight * np.where(linear.knot >= 0, delta[linear.knot], 0.0)).sum(axis=2)  # (g, l)
-    for i, (a, c) in enumerate(linear.ends):
-        acts[a] -= push[:, i] * linear.inverse_mass[a]
-        acts[c] += push[:, i] * linear.inverse_mass[c]
-    knot = np.full_like(linear.knot, -1)
-    single = linear._replace(others=1, column=np.zeros_like(bodies), body=bodies, acts=acts, knot=knot)
-    trace = np.zeros((len(record.time), len(layout.bodies)))
-    propagate(single, 0, equations.sampling, np.zeros((record.bins, len(layout.outputs), 1)), trace)
-    return motion_of(layout, record, r, theta + delta, trajectory.a + trace)
+    change = respond(equations.linear, np.append(1.0, delta[equations.columns]))
+    return motion_of(layout, record, r, theta + delta, trajectory.a + change)
 
 
 def equation_error_start(
@@ -202,7 +195,7 @@ def fit(
     shapes, stays = shape_parameters(layout), np.isin(np.arange(layout.size), held)
     kept: tuple[_Point, Step] | None = None
     least: tuple[_Point, Step, Normal] | None = None
-    halvings, last, iteration = 0, np.inf, 0
+    halvings, last, iteration, circles = 0, np.inf, 0, 0
     while True:
         iteration += 1
         stage = stages.pop(0) if stages else FREE_RUN
@@ -221,8 +214,11 @@ def fit(
             return _failed(layout, point, iteration)
         kept = (point, step) if stage == FREE_RUN else None
         halvings = 0
-        if stage == FREE_RUN and (least is None or step.before < least[1].before):
-            least = point, step, normal
+        enough = max(CONVERGED, COARSE * (step.after - 1.3 * normal.samples))
+        if stage == FREE_RUN:
+            circles = 0 if least is None or step.before < least[1].before - enough else circles + 1
+            if least is None or step.before < least[1].before:
+                least = point, step, normal
         delta = step.delta * _shorten(step.delta, shapes)
         moved = [
             advance(layout, record, r, point.theta, delta, trajectory, eq)
@@ -230,10 +226,9 @@ def fit(
         ]
         point = _Point(point.theta + delta, moved)
         change, last = abs(last - step.after) if stage == FREE_RUN else np.inf, step.after
-        enough = max(CONVERGED, COARSE * (step.after - 1.3 * normal.samples))
         if stage == FREE_RUN and (change < enough or (iteration >= LEAST and step.after - change > hopeless)):
             break
-        if iteration >= most:
+        if circles >= CIRCLES or iteration >= most:
             break
     cost = step.after
     if least is not None and not 0.0 <= cost <= least[1].before:

@@ -11,8 +11,8 @@ from crash_replay.conditioning import cfc_filter
 from ..effects.base import AttachedBody, BodyForce, BodyInertia
 from .layout import Layout, Link, Place
 from .linkforce import LinkForce, link_force
-from .motion import distortion, driven_motion, measured_motion
-from .propagate import DRIVEN, FREE, Linear, Sampling
+from .motion import distortion, driven_by, measured_motion
+from .propagate import DRIVEN, FREE, Linear, Sampling, ranked
 from .records import Record
 from .temper import CFC, SLOWEST
 from .trajectory import Trajectory, measured_crush
@@ -24,7 +24,7 @@ class Equations(NamedTuple):
     linear: Linear
     sampling: Sampling
     rows: np.ndarray  # (g, b) acceleration of free and driven bodies, force on fixed ones, as the forces give them
-    columns: np.ndarray  # parameter of each column after the first, (columns - 1,)
+    columns: np.ndarray  # parameter of each column after the first, (columns - 1,); of knots only those in use
     links: list[LinkForce]
 
 
@@ -55,20 +55,13 @@ def linearise(
             if inverse[k]:
                 act(parameter, k, sign * inverse[k] * force)
 
-    loads = np.zeros((g, bodies))
-    n = len(layout.links)
-    kx, kv, kp = np.zeros((g, n)), np.zeros((g, n)), np.zeros((g, n))
-    loading, knot, weight = np.zeros((g, n), bool), np.zeros((g, n, 2), np.int64), np.zeros((g, n, 2))
-    forces = []
-    for i, link in enumerate(layout.links):
+    loads, forces, steps = np.zeros((bodies, g)).T, [], blur * _steps(record)
+    for link in layout.links:
         crush, rate = _motion(link, record, r, trajectory)
-        found = link_force(link, theta, record.time, blur * _steps(record), crush, rate)
+        found = link_force(link, theta, record.time, steps, crush, rate)
         a, c = link.ends
         loads[:, a] -= found.force
         loads[:, c] += found.force
-        kx[:, i], kv[:, i], kp[:, i] = found.kx, found.kv, found.kp
-        loading[:, i] = found.loading & found.kp.any()  # no peak is kept that nothing hangs on
-        knot[:, i], weight[:, i] = found.knot, found.weight
         for parameter, column in zip(found.parameters, found.columns):
             push(parameter, link.ends, column)
         forces.append(found)
@@ -77,7 +70,7 @@ def linearise(
         present = forces[numbers[link.name]]
         crush, rate = _motion(link, record, r, trajectory)
         tried = np.append(theta, link.trial)
-        other = link_force(_acting(link, theta), tried, record.time, blur * _steps(record), crush, rate)
+        other = link_force(_acting(link, theta), tried, record.time, steps, crush, rate)
         push(layout.size + j, link.ends, other.force - present.force)
     for place in layout.places:
         _body_effect(layout, record, place, theta, trajectory, loads, act, inverse)
@@ -92,7 +85,7 @@ def linearise(
         if isinstance(addition.effect, AttachedBody) and addition.taken_from:
             k = layout.structure.body_index[addition.taken_from]
             act(place.coefficient, k, inverse[k] * rows[:, k])
-    for k, parameter, column in driven_motion(layout, record, r, theta)[1]:
+    for k, parameter, column in driven_by(layout, record, r, theta):
         act(parameter, k, column)
     sampling, outputs = _sampling(layout, record, theta)
     for parameter in [*outputs, *(layout.offsets[r] + q for q in range(len(layout.outputs)))]:
@@ -107,11 +100,20 @@ def linearise(
     ends = np.array([link.ends for link in layout.links]).reshape(-1, 2)
     crush_ends = np.array([link.crush_ends for link in layout.links]).reshape(-1, 2)
     column, body, acts = (np.array(each) for each in zip(*acting))
+    n = len(forces)
+    kx, kv, kp = np.array([(f.kx, f.kv, f.kp) for f in forces], float).reshape(n, 3, g).transpose(1, 0, 2)
+    peaks = [f.loading & f.kp.any() for f in forces]  # none is kept that nothing hangs on
+    loading = np.array(peaks, bool).reshape(n, g)
+    weight = np.array([f.weight for f in forces], float).reshape(n, g, 2)
+    knot, order, touched = ranked(np.array([f.knot for f in forces], np.int64).reshape(n, g, 2), layout.knots)
+    changed = np.ones(g, bool)
+    changed[1:] = (np.diff(kx) != 0.0).any(axis=0) | (np.diff(kv) != 0.0).any(axis=0)
+    changed[1:] |= np.abs(np.diff(record.dt)) > 1e-9 * record.step
     linear = Linear(
-        record.dt, ends, crush_ends, inverse, layout.kind, kx, kv, kp, loading, knot, weight, pull,
-        1 + len(columns), column, body, acts,
+        record.dt, ends, crush_ends, inverse, layout.kind, kx, kv, kp, loading, knot, weight, changed, pull,
+        1 + len(columns), column, body, acts, touched,
     )  # fmt: skip
-    every = np.concatenate([np.array(list(columns), dtype=int), np.arange(layout.knots)])
+    every = np.concatenate([np.array(list(columns), dtype=int), order])
     return Equations(linear, sampling, rows, every, forces)
 
 

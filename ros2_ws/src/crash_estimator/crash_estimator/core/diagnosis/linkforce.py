@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects.base import ElementMotion
-from .curves import value
 from .layout import Link, Place
+from .spring import NO_CURVE, Law, Spring, spring
 
 SMALL_CRUSH = 1e-6
 SMALL_RATE = 1e-4
@@ -41,28 +41,11 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
     """Force of a link over crush (g,) m and rate (g,) m/s."""
     parameters: list[int] = []
     columns: list[np.ndarray] = []
-    gap = theta[link.gap] if link.gap is not None else 0.0
-    x = crush - gap
-    peak = np.maximum(np.maximum.accumulate(x), 0.0)
-    loading = x >= peak
-    slope = theta[link.slope] if link.slope is not None else link.unloading
-    on_line = ~loading & (slope is not None)
-    at = np.where(on_line, peak, x)
-    if link.curve is not None:
-        curve = value(link.curve, theta, at)
-        static, stiffness, knot, weight = curve.force, curve.slope, curve.column, curve.weight
-    else:
-        k = theta[link.constant] if link.constant is not None else link.known_stiffness
-        static, stiffness = k * at, np.full_like(at, k)
-        knot, weight = np.full((len(x), 2), -1), np.zeros((len(x), 2))
-    kx, kp = stiffness, np.zeros_like(at)
-    if slope is not None:
-        static = static - np.where(on_line, slope * (peak - x), 0.0)
-        kx, kp = np.where(on_line, slope, stiffness), np.where(on_line, stiffness - slope, 0.0)
-    gate, gate_slope, open_ = _gate(link, x, rate, dt, static, on_line, slope)
-    spring_weight, spring_kp = weight, kp
-    static, kx, kp = static * open_, kx * open_, kp * open_
-    weight = weight * open_[:, None]
+    found = _spring(link, theta, dt, crush, rate)
+    x, peak, on_line, at, gate, gate_slope = (
+        found.x, found.peak, found.on_line, found.at, found.gate, found.gate_slope
+    )  # fmt: skip
+    static, kx, kp, weight, open_ = found.static, found.kx, found.kp, found.weight, found.carries
     if link.curve is None and link.constant is not None:
         parameters.append(link.constant)
         columns.append(at * open_)
@@ -86,6 +69,7 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
 
     damping = theta[link.damping] if link.damping is not None else link.known_damping
     if damping or link.damping is not None or link.forces:
+        slope = _slope(link, theta)
         parallel, px, pv = damping * rate, np.zeros_like(x), np.full_like(x, damping)
         if link.damping is not None:
             parameters.append(link.damping)
@@ -107,42 +91,41 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
         if slope is not None:
             # on the unloading line it is the spring's force that opens the contact: what changes it, moves the instant
             opens = np.where(on_line, gate_slope * parallel / max(slope, 1.0), 0.0)
-            weight, kp = weight + opens[:, None] * spring_weight, kp + opens * spring_kp
+            weight, kp = weight + opens[:, None] * found.weight_line, kp + opens * found.kp_line
             columns = [c + opens * at if p == link.constant else c for p, c in zip(parameters, columns)]
     if link.gap is not None:
         parameters.append(link.gap)
         columns.append(-np.where(on_line, kx + kp, kx))
-    unloads = on_line if slope is not None else rate < 0.0
+    unloads = rate < 0.0 if _slope(link, theta) is None else on_line
     apart = open_ == 0.0
     if not link.pulls and _one_way(link):
         acts = (force >= 0.0) | (static < 0.0)
         apart |= ~acts
         force, kx, kv, kp, weight = force * acts, kx * acts, kv * acts, kp * acts, weight * acts[:, None]
         columns = [column * acts for column in columns]
-    return LinkForce(force, kx, kv, kp, loading, knot, weight, parameters, columns, apart, unloads)
+    return LinkForce(force, kx, kv, kp, found.loading, found.knot, weight, parameters, columns, apart, unloads)
 
 
 def _one_way(link: Link) -> bool:
     return not link.tension or link.gap is not None
 
 
-def _gate(link: Link, x, rate, dt, static, on_line, slope):
-    """(gate, its slope by crush, whether the spring carries) over g instants."""
-    if not _one_way(link):
-        one = np.ones_like(x)
-        return one, np.zeros_like(x), one
-    carries = x > 0.0
-    margin = x
-    if slope is not None:
-        spent = on_line & (static <= 0.0)
-        carries = carries & ~spent
-        margin = np.where(on_line, np.minimum(x, static / max(slope, 1.0)), x)
-    width = np.maximum(np.abs(rate) * dt, 1e-9)
-    ramp = margin / width + 0.5
-    gate = np.clip(ramp, 0.0, 1.0)
-    if x[0] >= 0.0 and rate[0] > 0.0:
-        gate[0] = 1.0  # touching at time zero: it carries from then on
-    return gate, np.where((ramp > 0.0) & (ramp < 1.0), 1.0 / width, 0.0), carries.astype(float)
+def _slope(link: Link, theta: np.ndarray) -> float | None:
+    """N/m of the line on which it unloads; None where it does so on its curve."""
+    return theta[link.slope] if link.slope is not None else link.unloading
+
+
+def _spring(link: Link, theta: np.ndarray, dt, crush: np.ndarray, rate: np.ndarray) -> Spring:
+    slope, curve, stiffness = _slope(link, theta), NO_CURVE, link.known_stiffness
+    if link.curve is not None:
+        curve = link.curve.knots, np.where(link.curve.column >= 0, theta[link.curve.column], 0.0), link.curve.column
+    elif link.constant is not None:
+        stiffness = theta[link.constant]
+    law = Law(
+        float(theta[link.gap]) if link.gap is not None else 0.0, slope is not None, float(slope or 0.0),
+        *curve, float(stiffness), _one_way(link),
+    )  # fmt: skip
+    return Spring(*spring(law, crush, rate, dt))
 
 
 def _shapes(place: Place, theta: np.ndarray, changed: str = "", by: float = 0.0) -> dict[str, float]:

@@ -1,5 +1,6 @@
 """Motions as the sensors show them, if they err as the parameters say; where bodies start, and driven ones go."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,43 +22,64 @@ class Distortion(NamedTuple):
     parameters: tuple[int, int, int] = (-1, -1, -1)
 
 
+NO_DISTORTION = Distortion()
+
+
 def distortion(layout: Layout, theta: np.ndarray, channel: str) -> Distortion:
+    places = [p for p in layout.places if p.addition.target == channel and isinstance(p.addition.effect, ChannelError)]
+    if not places:
+        return NO_DISTORTION
     found, parameters = {"gain": 0.0, "delay": 0.0, "offset": 0.0}, {"gain": -1, "delay": -1, "offset": -1}
-    for place in layout.places:
-        if isinstance(place.addition.effect, ChannelError) and place.addition.target == channel:
-            found[place.addition.effect.role] = float(theta[place.coefficient])
-            parameters[place.addition.effect.role] = place.coefficient
+    for place in places:
+        found[place.addition.effect.role] = float(theta[place.coefficient])
+        parameters[place.addition.effect.role] = place.coefficient
     found["delay"] = max(found["delay"], 0.0)  # at its limit it may be a rounding error below
     return Distortion(**found, parameters=tuple(parameters.values()))
 
 
-def driven_motion(layout: Layout, record: Record, r: int, theta: np.ndarray):
-    """Acceleration (g, b) of the driven bodies, and its derivatives: a list of (body, parameter, (g,))."""
-    structure = layout.structure
-    g = len(record.time)
-    a, by = np.zeros((g, len(layout.bodies))), []
-    channels = {k: body.acceleration for k, body in enumerate(structure.bodies) if body.driven}
-    channels |= {k: (channel,) for channel, k in layout.attached.items()}
-    for k, names in channels.items():
+def driven_motion(layout: Layout, record: Record, r: int, theta: np.ndarray) -> np.ndarray:
+    """Acceleration (g, b) of the driven bodies."""
+    a = np.zeros((len(layout.bodies), len(record.time))).T
+    for k, names in _driving(layout).items():
         for name in names:
-            d, signal = distortion(layout, theta, name), record.signals[name]
-            share = 1.0 / len(names)
-            after = record.time + d.delay
-            true = (np.interp(after, signal.time, signal.values) - d.offset) / (1.0 + d.gain)
-            a[:, k] += share * true
+            a[:, k] += true_acceleration(record, name, distortion(layout, theta, name)) / len(names)
+        first = layout.modes[r][k]
+        a[:, k] += record.cosines @ theta[first : first + DRIVEN_MODES + 1]
+    return a
+
+
+def driven_by(layout: Layout, record: Record, r: int, theta: np.ndarray) -> list[tuple[int, int, np.ndarray]]:
+    """Its derivatives: (body, parameter, (g,))."""
+    by = []
+    for k, names in _driving(layout).items():
+        for name in names:
+            d = distortion(layout, theta, name)
+            true, share = true_acceleration(record, name, d), 1.0 / len(names)
             gain, delay, offset = d.parameters
             if gain >= 0:
                 by.append((k, gain, -share * true / (1.0 + d.gain)))
             if offset >= 0:
-                by.append((k, offset, np.full(g, -share / (1.0 + d.gain))))
+                by.append((k, offset, np.full(len(true), -share / (1.0 + d.gain))))
             if delay >= 0:
-                step = 0.5 * record.step
+                signal, after, step = record.signals[name], record.time + d.delay, 0.5 * record.step
                 up, down = (np.interp(after + s * step, signal.time, signal.values) for s in (1.0, -1.0))
                 by.append((k, delay, share * (up - down) / (2.0 * step) / (1.0 + d.gain)))
         first = layout.modes[r][k]
-        a[:, k] += record.cosines @ theta[first : first + DRIVEN_MODES + 1]
         by += [(k, first + j, record.cosines[:, j]) for j in range(DRIVEN_MODES + 1)]
-    return a, by
+    return by
+
+
+def _driving(layout: Layout) -> dict[int, Sequence[str]]:
+    """The driven bodies, and the channels that each is driven by."""
+    found = {k: body.acceleration for k, body in enumerate(layout.structure.bodies) if body.driven}
+    return found | {k: (channel,) for channel, k in layout.attached.items()}
+
+
+def true_acceleration(record: Record, channel: str, d: Distortion) -> np.ndarray:
+    """(g,) What a channel has measured, if it errs like that."""
+    signal = record.signals[channel]
+    recorded = np.interp(record.time + d.delay, signal.time, signal.values) if d.delay else signal.on_grid
+    return (recorded - d.offset) / (1.0 + d.gain)
 
 
 def start_values(layout: Layout, record: Record) -> tuple[np.ndarray, np.ndarray]:
@@ -73,18 +95,16 @@ def start_values(layout: Layout, record: Record) -> tuple[np.ndarray, np.ndarray
 
 def measured_motion(layout: Layout, record: Record, r: int, theta: np.ndarray) -> Trajectory:
     """What the sensors say of the motion, if they err as theta says."""
-    a = np.zeros((len(record.time), len(layout.bodies)))
+    a = np.zeros((len(layout.bodies), len(record.time))).T
     for k, body in enumerate(layout.structure.bodies):
         for name in body.acceleration if body.free else ():
-            d, signal = distortion(layout, theta, name), record.signals[name]
-            recorded = np.interp(record.time + d.delay, signal.time, signal.values)
-            a[:, k] += (recorded - d.offset) / (1.0 + d.gain) / len(body.acceleration)
+            a[:, k] += true_acceleration(record, name, distortion(layout, theta, name)) / len(body.acceleration)
     return motion_of(layout, record, r, theta, a)
 
 
 def motion_of(layout: Layout, record: Record, r: int, theta: np.ndarray, free: np.ndarray) -> Trajectory:
     """The trajectory in which free bodies accelerate as given (g, bodies) and driven ones as theta says."""
-    a = driven_motion(layout, record, r, theta)[0]
+    a = driven_motion(layout, record, r, theta)
     for k in np.flatnonzero(layout.kind == FREE):
         a[:, k] = free[:, k]
     v0, x0 = start_values(layout, record)

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
+from .. import compile_cache as _compile_cache  # noqa: F401  before any compiled function is defined
 from .layout import Layout
 from .linearise import Equations, linearise, output_noise, predicted
 from .motion import measured_motion
 from .propagate import FREE, propagate
 from .records import Record
-
-NO_TRACE = np.zeros((0, 0))
 
 may_diverge = np.errstate(over="ignore", invalid="ignore", divide="ignore")
 """A trial step can lead into motions without bounds; that its result is not finite is noticed in `fit.solve`."""
@@ -56,51 +56,65 @@ def normal_equations(
         if not follow:
             still = np.zeros_like(equations.linear.kx)
             equations = equations._replace(linear=equations.linear._replace(kx=still, kv=still, kp=still))
-        residual, jacobian = whitened(layout, record, r, theta, trajectory, equations, target)
-        flat = jacobian.reshape(-1, jacobian.shape[-1])
-        c = equations.columns
-        matrix[np.ix_(c, c)] += flat.T @ flat
-        vector[c] += flat.T @ residual.ravel()
+        flat = whitened(layout, record, r, theta, trajectory, equations, target)
+        flat = flat.reshape(-1, flat.shape[-1])
+        products = flat.T @ flat
+        _put(equations.columns, products, matrix, vector)
         noise, filled = output_noise(layout, record, theta, record.per_bin), _filled(record)
         for q, parameter, slope in noise.growth:
             # a noisy regressor draws its coefficient towards zero, by as much as the noise it brings grows with it
             vector[parameter] += slope * filled[q]
         grown += 2.0 * float(filled @ np.log(noise.std / record.noise))
-        cost += float(residual.ravel() @ residual.ravel())
-        samples += residual.size
+        cost += float(products[0, 0])
+        samples += len(flat)
         every.append(equations)
     return Normal(matrix, vector, cost, samples, grown), every
 
 
+@njit(cache=True)
+def _put(columns, products, matrix, vector):
+    """Add the products of a record's columns where their parameters are."""
+    for i in range(len(columns)):
+        vector[columns[i]] += products[0, i + 1]
+        for j in range(len(columns)):
+            matrix[columns[i], columns[j]] += products[i + 1, j + 1]
+
+
 def _filled(record: Record) -> np.ndarray:
     """(q,) bins with a valid sample."""
-    return np.array([np.count_nonzero(_binned(record, valid)) for valid in record.valid.T])
+    return np.count_nonzero(binned(record, record.valid), axis=0)
 
 
-def whitened(layout, record, r, theta, trajectory, equations, target=None) -> tuple[np.ndarray, np.ndarray]:
-    """Whitened binned residual (bins, q) corrected for the defect, and its derivative (bins, q, columns)."""
+def whitened(layout, record, r, theta, trajectory, equations, target=None) -> np.ndarray:
+    """(bins, q, 1 + columns): whitened binned residual corrected for the defect, then its derivative."""
     out = np.zeros((record.bins, len(layout.outputs), 1 + len(equations.columns)))
-    propagate(equations.linear, layout.knots, equations.sampling, out, NO_TRACE)
+    propagate(equations.linear, equations.sampling, out)
     # what acts on outputs only is linearised at the forces' prediction: the measured motion itself is noisy
-    by = predicted(layout, record, r, theta, equations.rows)[1]
     weight = equations.sampling.weight
-    position = {int(p): j + 1 for j, p in enumerate(equations.columns)}
-    for q, parameter, column in by:
-        out[:, q, position[parameter]] += _binned(record, weight[:, q] * column)
+    position = {int(p): j + 1 for j, p in enumerate(equations.columns[: equations.linear.others - 1])}
+    for q, parameter, column in predicted(layout, record, r, theta, equations.rows)[1]:
+        out[:, q, position[parameter]] += binned(record, (weight[:, q] * column)[:, None])[:, 0]
     # along the trajectory: the free bodies' own acceleration less the observer's; fixed forces are in column 0
     along = np.where(layout.kind == FREE, trajectory.a, 0.0)
     if target is not None:
         pull = equations.linear.pull
         push = pull**2 * (trajectory.x - target.x) + 2.0 * pull * (trajectory.v - target.v)
         along += np.where(layout.kind == FREE, push, 0.0)
-    misfit = np.zeros((len(record.time), len(layout.outputs)))
-    misfit[record.at] = np.nan_to_num(record.measured - predicted(layout, record, r, theta, along)[0][record.at])
-    residual = np.stack([_binned(record, weight[:, q] * misfit[:, q]) for q in range(len(layout.outputs))], axis=1)
-    residual, jacobian = residual - out[:, :, 0], out[:, :, 1:]
-    if record.mix is not None:
-        residual, jacobian = residual @ record.mix.T, record.mix @ jacobian
-    return residual, jacobian
+    misfit = record.on_grid - predicted(layout, record, r, theta, along)[0]
+    out[:, :, 0] = binned(record, weight * misfit) - out[:, :, 0]
+    return out if record.mix is None else record.mix @ out
 
 
-def _binned(record: Record, values: np.ndarray) -> np.ndarray:
-    return np.bincount(record.bin[record.at], weights=values[record.at], minlength=record.bins)
+def binned(record: Record, values: np.ndarray) -> np.ndarray:
+    """(bins, columns) sums of values (g, columns) at the samples."""
+    found = np.zeros((record.bins, values.shape[1]))
+    _add_up(record.bin, values, found)
+    return found
+
+
+@njit(cache=True)
+def _add_up(bins, values, found):
+    for k in range(values.shape[1]):
+        for t in range(len(bins)):
+            if bins[t] >= 0:
+                found[bins[t], k] += values[t, k]

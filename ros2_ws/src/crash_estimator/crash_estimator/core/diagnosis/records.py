@@ -32,6 +32,7 @@ class Signal(NamedTuple):
 
     time: np.ndarray  # s since the impact
     values: np.ndarray
+    on_grid: np.ndarray  # (g,) values at the instants of the record
     noise: float  # standard deviation of one sample
     noise_samples: float  # that it was found from
     offset_std: float  # of the zero offset that was removed
@@ -55,6 +56,7 @@ class Record(NamedTuple):
     at: np.ndarray  # (n,) indices of the samples on the grid
     period: float  # s, median between samples
     measured: np.ndarray  # (n, q) zero offset removed, NaN where not valid
+    on_grid: np.ndarray  # (g, q) the same at all instants, 0 where there is no valid sample
     noise: np.ndarray  # (q,) standard deviation of one sample
     noise_samples: np.ndarray  # (q,) samples that it was found from; inf where the model states it
     offset_std: np.ndarray  # (q,)
@@ -94,7 +96,7 @@ def make_record(structure: Structure, recording: Recording) -> Record:
     outputs = outputs_of(structure)
     names = [name for _, name, _ in structure.channels()]
     names += [c.name for c in recording.test.channels if c.quantity == "acceleration"]
-    signals = {name: _signal(recording, name) for name in dict.fromkeys(names)}
+    signals = {name: _signal(recording, name, time) for name in dict.fromkeys(names)}
     measured = np.stack([_raw(recording, o.channel, signals[o.channel])[after] for o in outputs], axis=1)
     given = [structure.bodies[o.body].noise for o in outputs]
     noise = np.array([g or signals[o.channel].noise for g, o in zip(given, outputs)])
@@ -107,6 +109,7 @@ def make_record(structure: Structure, recording: Recording) -> Record:
         at=at,
         period=float(np.median(np.diff(time[at]))),
         measured=measured,
+        on_grid=on_grid(time, at, measured),
         noise=noise,
         noise_samples=np.array([np.inf if g else signals[o.channel].noise_samples for g, o in zip(given, outputs)]),
         offset_std=np.array([signals[o.channel].offset_std for o in outputs]),
@@ -135,7 +138,14 @@ def _grid(sample_time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.append(time, stops[-1]), index[len(stops) - len(sample_time) :]
 
 
-def _signal(recording: Recording, name: str) -> Signal:
+def on_grid(time: np.ndarray, at: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """`on_grid` of a Record."""
+    found = np.zeros((len(time), measured.shape[1]))
+    found[at] = np.nan_to_num(measured)
+    return found
+
+
+def _signal(recording: Recording, name: str, grid: np.ndarray) -> Signal:
     values = recording.column(name)
     valid = np.isfinite(values)
     if not valid.any():
@@ -147,7 +157,8 @@ def _signal(recording: Recording, name: str) -> Signal:
     offset = float(values[before].mean()) if rests and count else 0.0
     bridged = np.interp(recording.time_ns, recording.time_ns[valid], values[valid]) - offset
     noise = sensor_noise(bridged, recording.time_ns, rests)
-    return Signal(recording.time, bridged, *noise, noise.std / np.sqrt(count) if count else 0.0)
+    values = np.interp(grid, recording.time, bridged)
+    return Signal(recording.time, bridged, values, *noise, noise.std / np.sqrt(count) if count else 0.0)
 
 
 def _raw(recording: Recording, name: str, signal: Signal) -> np.ndarray:

@@ -36,9 +36,13 @@ class Round(NamedTuple):
         return self.tried[0] if self.tried and self.tried[0].fit and self.tried[0].gain > GAIN else None
 
 
-def one_round(records: Sequence[Record], scales: Scales, effects: Mapping[str, Effect], model: Model) -> Round:
+def one_round(
+    records: Sequence[Record], scales: Scales, effects: Mapping[str, Effect], model: Model,
+    earlier: Sequence["Round"] = (),
+) -> Round:  # fmt: skip
     """Candidates against the sensors' noise; where none leaves only that, against what the best of them leaves."""
-    tried = try_candidates(records, scales, effects, model, thorough=True)
+    before = [tried for round_ in earlier for tried in round_.tried]
+    tried = try_candidates(records, scales, effects, model, thorough=True, before=before)
     done = Round(model, tried, tried)
     if model.left.whiteness.white or (done.best and assess(done.best.fit, records).whiteness.white):
         return done

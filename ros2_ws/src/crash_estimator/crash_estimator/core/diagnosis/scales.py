@@ -117,8 +117,7 @@ def attached_motion(structure: Structure, record: Record, addition) -> tuple[np.
     """(g,) acceleration, velocity and displacement of the body behind an unused channel."""
     from .trajectory import integrate  # noqa: PLC0415
 
-    signal = record.signals[addition.target]
-    a = np.interp(record.time, signal.time, signal.values)
+    a = record.signals[addition.target].on_grid
     x0, v0 = attached_start(structure, record, addition)
     v, x = integrate(record.dt, a[:, None], np.array([v0]), np.array([x0]))
     return a, v[:, 0], x[:, 0]

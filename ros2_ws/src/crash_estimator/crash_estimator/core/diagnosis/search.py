@@ -46,7 +46,7 @@ def _one_by_one(
 ) -> tuple[list[Round], Model]:  # fmt: skip
     """The best candidate is added as long as there is one; rounds: those that have led to the model."""
     while True:
-        done = one_round(records, scales, effects, model)
+        done = one_round(records, scales, effects, model, rounds)
         rounds.append(done)
         fair = _without(scales, model, done.best) if done.best and done.before is model else model
         if better(fair, model):
@@ -103,5 +103,5 @@ def _without(scales: Scales, model: Model, tried: Tried) -> Model:
     """The model refitted from where a candidate's fit has ended."""
     layout = model.fit.layout
     theta, motions = narrowed(layout, tried.fit, model.records)
-    found = fit(layout, model.records, (theta, motions))
+    found = fit(layout, model.records, (theta, motions), hopeless=model.fit.cost)
     return model._replace(fit=found, left=assess(found, model.records, sharply=True))

@@ -3,7 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
+from .. import compile_cache as _compile_cache  # noqa: F401  before any compiled function is defined
 from ..effects.base import ElementMotion
 from ..kinematics import RATE_SMOOTHING
 from ..structure import Structure
@@ -11,7 +13,7 @@ from .records import Record
 
 
 class Trajectory(NamedTuple):
-    """g instants, b bodies; a fixed body rests."""
+    """g instants, b bodies; a fixed body rests. One body's instants lie next to each other."""
 
     a: np.ndarray  # (g, b) m/s^2
     v: np.ndarray  # (g, b) m/s
@@ -20,21 +22,28 @@ class Trajectory(NamedTuple):
 
 def integrate(dt: np.ndarray, a: np.ndarray, v0: np.ndarray, x0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(g, b) velocity and displacement of a piecewise-linear acceleration (as in `kinematics`)."""
-    last = np.concatenate([a[:1], a[:-1]])
-    step = dt[:, None]
-    v = v0 + np.cumsum(0.5 * step * (last + a), axis=0)
-    before = np.concatenate([np.broadcast_to(v0, (1, a.shape[1])), v[:-1]])
-    x = x0 + np.cumsum(step * before + step * step * (2.0 * last + a) / 6.0, axis=0)
+    v, x = np.empty_like(a), np.empty_like(a)
+    _integrate(dt, a, np.asarray(v0, float), np.asarray(x0, float), v, x)
     return v, x
+
+
+@njit(cache=True)
+def _integrate(dt, a, v0, x0, v, x):
+    for k in range(a.shape[1]):
+        rate, place, last = v0[k], x0[k], a[0, k]
+        for t in range(len(dt)):
+            step, now = dt[t], a[t, k]
+            place += step * rate + step * step * (2.0 * last + now) / 6.0
+            rate += 0.5 * step * (last + now)
+            v[t, k], x[t, k], last = rate, place, now
 
 
 def measured_trajectory(structure: Structure, record: Record) -> Trajectory:
     """From the measured accelerations."""
-    a = np.zeros((len(record.time), len(structure.bodies)))
+    a = np.zeros((len(structure.bodies), len(record.time))).T
     for k, body in enumerate(structure.bodies):
         if body.acceleration:
-            signals = [record.signals[name] for name in body.acceleration]
-            a[:, k] = np.mean([np.interp(record.time, s.time, s.values) for s in signals], axis=0)
+            a[:, k] = np.mean([record.signals[name].on_grid for name in body.acceleration], axis=0)
     v, x = integrate(record.dt, a, record.initial_velocity, record.initial_displacement)
     return Trajectory(a, v, x)
 
@@ -53,11 +62,9 @@ def element_motion(structure: Structure, record: Record, trajectory: Trajectory,
 
 def measured_crush(record: Record, displacement: str, velocity: str | None) -> tuple[np.ndarray, np.ndarray]:
     """(g,) crush and rate from measured channels; without its own channel the rate is the crush's smoothed slope."""
-    signal = record.signals[displacement]
-    crush = np.interp(record.time, signal.time, signal.values)
+    crush = record.signals[displacement].on_grid
     if velocity:
-        signal = record.signals[velocity]
-        return crush, np.interp(record.time, signal.time, signal.values)
+        return crush, record.signals[velocity].on_grid
     slope = np.gradient(crush, record.time)
     width = max(int(round(RATE_SMOOTHING / record.step)), 1) | 1
     padded = np.concatenate([np.full(width // 2, slope[0]), slope, np.full(width // 2, slope[-1])])

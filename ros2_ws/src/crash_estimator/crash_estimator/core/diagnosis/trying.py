@@ -46,7 +46,8 @@ WORTH_FITTING = 1.0
 """Nats of a screened gain."""
 
 HOPELESS = 400.0
-"""A candidate whose cost stays this far above the best one's is not fitted to the end."""
+"""A candidate whose cost stays this far above the best one's is not fitted to the end; where the model leaves only
+noise, nor is one that does not come below the model's own."""
 
 OFFSETS, OFFSET_STARTS = 10, 2
 """An offset bends the measured motion itself, from which fits start: so many are looked at, so many are fitted from."""
@@ -63,12 +64,12 @@ class Tried(NamedTuple):
 
 def try_candidates(
     records: Sequence[Record], scales: Scales, effects: Mapping[str, Effect], model: Model, thorough: bool = False,
-    known: Sequence[Tried] = (),
+    known: Sequence[Tried] = (), before: Sequence[Tried] = (),
 ) -> list[Tried]:  # fmt: skip
     """All candidates for one more addition, best first; one for each effect and target.
 
     thorough: try more of them, and harder, where none of the most likely ones leaves white noise. known: what was
-    found in another noise, best first; its best fits are taken up.
+    found in another noise, best first; its best fits are taken up. before: what was found in the rounds before.
     """
     additions = candidates(scales.structure, scales, effects, model.additions)
     by_fit = screen(records, scales, model.additions, additions, model.roughness, model.fit)
@@ -81,7 +82,11 @@ def try_candidates(
     search.from_model(shortlist(worth, SHORTLIST))
     search.taken_up([tried for tried in known if tried.fit][:SHORTLIST])
     if thorough and model.left.cost < NEAR_THE_FLOOR:
-        search.from_motion(Screened(a, 0.0, 0.0, 1.0) for a in additions if _bends_driven_motion(scales, a))
+        bend = [a for a in additions if _bends_driven_motion(scales, a)]
+        if model.left.whiteness.white:  # to stand for what was added, one would have had to explain all alone
+            fitted = {tried.addition.key for tried in before if tried.fit}
+            bend = [a for a in bend if a.key not in fitted]
+        search.from_motion(Screened(a, 0.0, 0.0, 1.0) for a in bend)
     if thorough and not model.left.whiteness.white:
         offsets = [a for a in additions if isinstance(a.effect, ChannelError) and a.effect.role == "offset"]
         for harder in (
@@ -185,7 +190,8 @@ class _Search:
         self.done.add((id(addition), stages))
         layout = self._layout(addition)
         start = self._start(layout, addition, screened) if screened else None
-        self._note(addition, fit(layout, self.records, start, self.least + HOPELESS, refine=stages))
+        hopeless = self.model.fit.cost if self.model.left.whiteness.white else self.least + HOPELESS
+        self._note(addition, fit(layout, self.records, start, hopeless, refine=stages))
 
     def _note(self, addition: Addition, found: Fit) -> None:
         self.least = min(self.least, found.cost)
