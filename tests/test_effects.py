@@ -134,6 +134,15 @@ BAD_FILES = {
     "a taken name": (OWN.replace("cubic_damping", "viscous_damping"), "'viscous_damping' is an effect of"),
     "an error": ("1 / 0", "ZeroDivisionError"),
     "not Python": ("def (", "SyntaxError"),
+    "a misspelt name": (
+        OWN.replace("motion.rate**3", "motion.rat"),
+        "force of 'cubic_damping' fails .* no attribute 'rat'",
+    ),
+    "one sum for all instants": (
+        OWN.replace("motion.rate**3", "motion.rate[:7]"),
+        "one number for each of the 64 instants",
+    ),
+    "a root of what may be negative": (OWN.replace("rate**3", "rate**0.5"), "must be finite .* it is nan"),
 }
 
 
