@@ -11,15 +11,13 @@ from ruamel.yaml.comments import CommentedMap
 from crash_replay.bag import read_bag
 
 from ..core.diagnosis.diagnosis import Diagnosis, diagnose
-from ..core.effects import EFFECTS
 from ..core.effects.base import Effect, UnloadingSlope
 from ..core.effects.targets import key_of
-from ..core.effects.user import load_effects
 from ..core.structure import EffectSpec, ModelError
 from ..diagnosis_doubt import doubt
 from ..diagnosis_tables import diagnosis_tables
 from ..model_file import load_model, model_path, ready_models
-from .common import guarded, write_json
+from .common import add_effects_option, effects_of, guarded, write_json
 
 
 def main() -> None:
@@ -28,24 +26,24 @@ def main() -> None:
     parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
     parser.add_argument("--apply", metavar="NEW_MODEL.yaml", help="write the model with the effects that were found")
     parser.add_argument("--json", metavar="FILE", help="write everything that was found")
-    parser.add_argument("--effects", metavar="FILE.py", help="your own effects; the file is executed")
+    add_effects_option(parser)
     arguments = parser.parse_args()
     sys.exit(guarded(lambda: run(arguments)))
 
 
 def run(arguments: argparse.Namespace) -> None:
-    effects = EFFECTS | (load_effects(arguments.effects) if arguments.effects else {})
+    effects = effects_of(arguments)
     structure = load_model(arguments.model)
     for option, path in (("--json", arguments.json), ("--apply", arguments.apply)):
         if path:
             _writable(option, Path(path))
     found = diagnose(structure, [read_bag(bag) for bag in arguments.bags], effects)
+    if arguments.json:  # files before words: `| head` ends this at a line that nobody reads
+        write_json(arguments.json, found.as_json())
+    added = apply(found, structure.effects, effects, arguments.model, arguments.apply) if arguments.apply else ""
     print("\n".join(line for line in (found.text, doubt(found)) if line))
     print(f"\n{diagnosis_tables(found)}")
-    if arguments.json:
-        write_json(arguments.json, found.as_json())
     if arguments.apply:
-        added = apply(found, structure.effects, effects, arguments.model, arguments.apply)
         print(f"\n{arguments.apply}: {arguments.model} with {added or 'nothing added'}")
 
 
