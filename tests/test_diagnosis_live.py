@@ -272,6 +272,20 @@ def test_a_process_answers_with_the_users_effects_and_is_replaced_where_it_ends(
         worker.close()
 
 
+def test_a_fault_in_a_users_effect_is_told_by_its_name_and_the_process_lives(damped, tmp_path):
+    _, model, recording = damped
+    path = tmp_path / "stick.py"
+    path.write_text(OWN_EFFECT.replace("np.tanh(", "1 / 0 if len(motion.time) > 64 else np.tanh("))
+    worker = Worker(model, str(path))
+    try:
+        assert _reply(worker, ready=True) is None
+        worker.ask(Task(model, recording, final=True))
+        assert _reply(worker).error == "the diagnosis failed: ZeroDivisionError: division by zero"
+        assert worker.process.poll() is None
+    finally:
+        worker.close()
+
+
 def _reply(worker: Worker, ready: bool = False):
     """What it replies; ready: no reply is awaited, only that it can be asked."""
     deadline = time.monotonic() + 60.0

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import traceback
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection, Pipe
@@ -64,7 +65,7 @@ class Answerer:
         values = np.random.default_rng(0).normal(size=(TRY_OUT, len(channels)))
         time_ns = np.arange(-TRY_OUT // 2, TRY_OUT // 2) * 100_000
         recording = Recording(Test("try-out", tuple(channels.values())), time_ns, values)
-        with suppress(ModelError, RecordingError, np.linalg.LinAlgError):  # an effect may need a channel of the test
+        with suppress(Exception):  # an effect may need a channel of the test; what is at fault fails on the test, too
             self.answer(Task(structure, recording, final=False))
 
 
@@ -153,3 +154,6 @@ def _reply(answerer: Answerer, task: Task) -> Reply:
         return Reply(None, " ".join(str(error).split()))
     except np.linalg.LinAlgError as error:
         return Reply(None, f"the fit broke down ({error})" if task.final else "")
+    except Exception as error:  # a fault, ours or in a user's effect: said by its name, and the log has where it is
+        traceback.print_exc()
+        return Reply(None, f"the diagnosis failed: {' '.join(f'{type(error).__name__}: {error}'.split())}")
