@@ -48,7 +48,7 @@ def test_a_curve_is_read_where_the_crush_is_whichever_way_it_goes():
         force = link_force(link, found.theta, record.time, steps, crush, rate).force
         peak = np.maximum(np.maximum.accumulate(crush), 0.0)
         at, line = (crush, 0.0) if link.unloading is None else (peak, link.unloading * (peak - crush))
-        read = value(link.curve, found.theta, at).force - line
+        read = value(link.curve, found.theta, at) - line
         carries = link.tension | ((crush > 0.0) & ((read > 0.0) | (crush >= peak)))
         damping = found.theta[link.damping] if link.damping is not None else link.known_damping
         assert damping == 0.0 and carries.any()

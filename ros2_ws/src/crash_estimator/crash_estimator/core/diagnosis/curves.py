@@ -27,15 +27,6 @@ class Curve(NamedTuple):
     force_scale: float
 
 
-class CurveValue(NamedTuple):
-    """F at g crushes, its slope, and the two knots it hangs on."""
-
-    force: np.ndarray  # (g,) N
-    slope: np.ndarray  # (g,) N/m
-    column: np.ndarray  # (g, 2)
-    weight: np.ndarray  # (g, 2)
-
-
 def make_knots(lowest: float, highest: float, scale: float, cells: int, tension: bool) -> np.ndarray:
     """Even knots over the crushes met and one cell beyond, with one at 0."""
     step = scale / cells
@@ -44,19 +35,13 @@ def make_knots(lowest: float, highest: float, scale: float, cells: int, tension:
     return np.arange(first, last + 1) * step
 
 
-def value(curve: Curve, theta: np.ndarray, crush: np.ndarray) -> CurveValue:
-    """The curve at crush (g,) m; straight on beyond the last knots."""
+def value(curve: Curve, theta: np.ndarray, crush: np.ndarray) -> np.ndarray:
+    """(g,) N: the curve at crush (g,) m; straight on beyond the last knots."""
     force_at = np.where(curve.column >= 0, theta[curve.column], 0.0)
     cell = np.clip(np.searchsorted(curve.knots, crush, side="right") - 1, 0, len(curve.knots) - 2)
-    width = np.diff(curve.knots)[cell]
-    right = (crush - curve.knots[cell]) / width
+    right = (crush - curve.knots[cell]) / np.diff(curve.knots)[cell]
     low, high = force_at[cell], force_at[cell + 1]
-    return CurveValue(
-        low + right * (high - low),
-        (high - low) / width,
-        np.stack([curve.column[cell], curve.column[cell + 1]], axis=1),
-        np.stack([1.0 - right, right], axis=1),
-    )
+    return low + right * (high - low)
 
 
 def slope_changes(knots: np.ndarray, crush_scale: float, force_scale: float) -> tuple[np.ndarray, np.ndarray]:

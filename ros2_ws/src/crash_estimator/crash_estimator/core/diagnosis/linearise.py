@@ -10,9 +10,10 @@ from crash_replay.conditioning import cfc_filter
 
 from ..effects.base import AttachedBody, BodyForce, BodyInertia
 from .layout import Layout, Link, Place
+from .linear import Linear, Sampling, ranked
 from .linkforce import LinkForce, link_force
 from .motion import distortion, driven_by, measured_motion
-from .propagate import DRIVEN, FREE, Linear, Sampling, ranked
+from .propagate import DRIVEN, FREE
 from .records import Record
 from .temper import CFC, SLOWEST
 from .trajectory import Trajectory, measured_crush

@@ -32,7 +32,7 @@ def _parameters(last: Fit, layout: Layout) -> np.ndarray:
     for link in layout.links:
         if link.curve is not None:
             here = link.curve.column >= 0
-            theta[link.curve.column[here]] = value(curves[link.name], last.theta, link.curve.knots[here]).force
+            theta[link.curve.column[here]] = value(curves[link.name], last.theta, link.curve.knots[here])
     theta[layout.knots : layout.common] = last.theta[old.knots : old.common]
     for r, first in enumerate(layout.offsets):
         outputs = np.arange(len(layout.outputs))
