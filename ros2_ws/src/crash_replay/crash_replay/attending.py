@@ -1,0 +1,77 @@
+"""A node's part in the attendance: it says its own words, hears those of the others and how far the replay has come."""
+
+import os
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+from crash_msgs.msg import Attendance as Message
+from crash_msgs.msg import ReplayState
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from .attendance import PERIOD, Attendance, Word
+from .processes import this_host
+from .qos import EVERY_SAMPLE_SAID, LATCHED
+
+TOPIC = "attendance"
+REPLAY = "replay"
+"""The role of the node that sends the samples."""
+
+
+class Progress(NamedTuple):
+    """What a node has to say of its work; see crash_msgs/Attendance."""
+
+    run: int = 0
+    total: int = 0
+    next: int = 0
+    missing: int = 0
+    done: bool = False
+    reason: str = ""
+    ready: bool = True
+
+
+class Attending:
+    """Says a word of the node at each `tell` and every half second, and keeps the last words of all others."""
+
+    def __init__(self, node: Node, role: str, progress: Callable[[], Progress]):
+        """progress: asked for at each word; before the first it must answer."""
+        self.progress = progress
+        self.own = Word(node.get_fully_qualified_name(), role, this_host(), os.getpid())
+        self.others = Attendance()
+        self.replay_state: ReplayState | None = None
+        self.out = node.create_publisher(Message, TOPIC, LATCHED)
+        node.create_subscription(Message, TOPIC, self._on_word, EVERY_SAMPLE_SAID)
+        if role != REPLAY:
+            node.create_subscription(ReplayState, "replay_state", self._on_state, LATCHED)
+        # not by the node's own clock, which may be the replay's and stand still
+        node.create_timer(PERIOD, self.tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.said_at = time.monotonic()
+
+    def tell(self) -> None:
+        """Say how far the node is."""
+        self.own = self.own._replace(**self.progress()._asdict())
+        self.said_at = time.monotonic()
+        self.out.publish(Message(**self.own._asdict()))
+
+    def leave(self) -> str:
+        """The last word, as the node ends -> what its results lack, or ""."""
+        self.own = self.own._replace(**self.progress()._asdict(), leaving=True)
+        self.out.publish(Message(**self.own._asdict()))
+        own = self.own
+        if not own.total or (own.next >= own.total and not own.missing):
+            return ""
+        why = own.reason or "ended before the rest came"
+        return f"incomplete: {own.next - own.missing} of {own.total} samples ({why})"
+
+    def _on_word(self, message: Message) -> None:
+        if message.node != self.own.node or message.process != self.own.process or message.host != self.own.host:
+            self.others.hear(Word(*(getattr(message, field) for field in Word._fields)))
+
+    def _on_state(self, message: ReplayState) -> None:
+        self.replay_state = message
+
+    def replay_is_there(self) -> bool | None:
+        """Whether a replay takes part that has not ended; None where none has ever said a word."""
+        replays = self.others.names(REPLAY)
+        return any(self.others.there(name) for name in replays) if replays else None
