@@ -12,12 +12,44 @@ from crash_replay.player import Mode, Player
 from crash_replay.recording import Channel, Recording, Test
 
 
+class Audience:
+    """Subscribers, and what they say of themselves."""
+
+    def __init__(self, subscribers: int):
+        self.subscribers = subscribers
+        self.preparing: list[str] = []
+        self.lack: dict[str, str] = {}  # what, by the names of those who ask for it
+        self.lost: dict[str, str] = {}  # likewise of those who are gone
+        self.warnings: list[str] = []
+
+    def ready(self):
+        return self.subscribers
+
+    def subscribed(self):
+        return [f"node{k}" for k in range(self.subscribers)]
+
+    def not_ready(self, names):
+        return [name for name in names if name in self.preparing]
+
+    def forget_gone(self):
+        self.lost.clear()
+
+    def behind(self, run, sent):
+        return list(self.lack)
+
+    def lacking(self, run, sent):
+        return [f"{name} has {what}" for name, what in {**self.lack, **self.lost}.items()]
+
+    def warn(self, text):
+        self.warnings.append(text)
+
+
 class Outlet:
     """Takes what the pacing sends, as long as it has room."""
 
-    def __init__(self, listeners: int = 1):
+    def __init__(self, subscribers: int = 1):
         self.batches, self.states = [], []
-        self.room, self.arrived, self.listeners = True, True, listeners
+        self.room, self.arrived, self.audience = True, True, Audience(subscribers)
 
     def send(self, batch):
         self.batches.append((time.perf_counter(), batch))
@@ -38,12 +70,6 @@ class Outlet:
         return self.arrived
 
     all_have_arrived = test_has_arrived
-
-    def subscribers(self):
-        return self.listeners
-
-    def subscriber_names(self):
-        return [f"node{k}" for k in range(self.listeners)]
 
     def numbers(self):
         return [number for _, batch in self.batches for number in range(batch.start, batch.stop)]
@@ -87,7 +113,7 @@ def test_all_is_sent_in_order_and_never_before_its_time():
     pacing.play()
     assert pacing.outlet.numbers() == list(range(20))
     assert min(wall - batch.due for wall, batch in pacing.outlet.batches) >= 0.0
-    assert pacing.finish().startswith("finished: 20 samples sent in 20 messages, rate 0.")
+    assert pacing.finish().text.startswith("finished: 20 samples sent in 20 messages, rate 0.")
     assert pacing.outlet.states[-1] == (Mode.FINISHED, 20)
 
 
@@ -158,7 +184,7 @@ def test_the_block_follows_the_rate():
 
 
 def test_it_waits_for_as_many_subscribers_as_were_asked_for():
-    pacing = pacing_of(outlet=Outlet(listeners=1))
+    pacing = pacing_of(outlet=Outlet(subscribers=1))
     begin = time.monotonic()
     pacing.wait_for_subscribers(1, 10.0)
     assert time.monotonic() - begin < 1.0
@@ -193,7 +219,7 @@ def test_a_signal_ends_it_between_two_messages():
     pacing.start()
     Timer(0.15, lambda: setattr(pacing, "stopped", True)).start()
     pacing.play()
-    line = pacing.finish()
+    line = pacing.finish().text
     assert 1 <= len(pacing.outlet.numbers()) < 20
     assert line.startswith(f"stopped before sample {len(pacing.outlet.numbers())} of 20: ")
 
@@ -202,4 +228,40 @@ def test_it_says_what_has_not_arrived(monkeypatch):
     monkeypatch.setattr("crash_replay.pacing.LAST_ACKNOWLEDGEMENT", 0.05)
     pacing = pacing_of()
     pacing.outlet.arrived = False
-    assert pacing.finish().endswith("ms late; a subscriber has not taken all of them")
+    assert pacing.finish().text.endswith("ms late; a subscriber has not taken all of them")
+
+
+def finished_pacing() -> Pacing:
+    pacing = pacing_of(n=3, rate=1000.0)
+    pacing.start()
+    pacing.play()
+    return pacing
+
+
+def test_it_stays_at_the_end_until_all_who_take_part_have_all():
+    pacing = finished_pacing()
+    audience = pacing.audience
+    audience.lack["/slow"] = "1 of 3 samples (stopped for 6 s)"
+    Timer(0.3, audience.lack.clear).start()
+    began = time.monotonic()
+    assert pacing.finish(timeout=PATIENCE).lacking == []
+    assert 0.25 < time.monotonic() - began < PATIENCE
+
+
+def test_who_lacks_something_at_the_end_is_said_and_not_waited_for_without_end():
+    pacing = finished_pacing()
+    pacing.audience.lack["/slow"] = "1 of 3 samples (stopped for 6 s)"
+    pacing.audience.lost["/dead"] = "2 of 3 samples (was killed)"
+    outcome = pacing.finish(timeout=2.3)
+    assert outcome.lacking == ["/slow has 1 of 3 samples (stopped for 6 s)", "/dead has 2 of 3 samples (was killed)"]
+    (warning,) = pacing.audience.warnings
+    assert warning.startswith("waiting up to 0 s for who lacks samples: /slow has 1 of 3 samples (stopped for 6 s)")
+
+
+def test_a_node_asked_for_by_name_is_waited_for_until_it_is_ready():
+    pacing = pacing_of()
+    pacing.audience.preparing.append("diagnosis")
+    with pytest.raises(SubscribersMissing, match="after 0.2 s not ready: diagnosis .on samples: node0.: start them"):
+        pacing.wait_for_subscribers(1, 0.2, ["estimator", "diagnosis"])
+    Timer(0.2, pacing.audience.preparing.clear).start()
+    pacing.wait_for_subscribers(1, PATIENCE, ["estimator", "diagnosis"])

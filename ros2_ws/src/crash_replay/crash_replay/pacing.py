@@ -2,9 +2,9 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from threading import Condition
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from .player import Batch, CommandError, Mode, Player, Tally, suitable_block
 from .recording import Recording
@@ -22,6 +22,19 @@ LAST_ACKNOWLEDGEMENT = 30.0
 """Seconds at the end for subscribers to take what has been sent; half a second where a signal has ended the replay."""
 
 
+WAITING = 0.02
+"""Seconds between two looks at who has come, or is through."""
+SAY_AFTER, SAY_AGAIN = 2.0, 30.0
+"""Seconds at the end after which it is said who is waited for, and between two such lines."""
+
+
+class Outcome(NamedTuple):
+    """How a replay went."""
+
+    text: str  # one line
+    lacking: list[str]  # a line on each who lacks samples
+
+
 class SubscribersMissing(Exception):
     """Not all subscribers that were asked for have come; the message is one readable line."""
 
@@ -36,8 +49,19 @@ class Outlet(Protocol):
     def look(self) -> None: ...  # called where there is time to see what has arrived
     def test_has_arrived(self) -> bool: ...
     def all_have_arrived(self) -> bool: ...
-    def subscribers(self) -> int: ...  # on samples
-    def subscriber_names(self) -> list[str]: ...
+    audience: "Listening"
+
+
+class Listening(Protocol):
+    """Who listens: `audience.Audience`."""
+
+    def ready(self) -> int: ...  # subscribers on samples
+    def subscribed(self) -> list[str]: ...  # names of all
+    def not_ready(self, names: Sequence[str]) -> list[str]: ...
+    def forget_gone(self) -> None: ...
+    def behind(self, run: int, sent: int) -> list[str]: ...  # who is there and lacks some of these samples
+    def lacking(self, run: int, sent: int) -> list[str]: ...  # a line on each who lacks some, gone or not
+    def warn(self, text: str) -> None: ...
 
 
 class Pacing:
@@ -45,6 +69,7 @@ class Pacing:
 
     def __init__(self, recording: Recording, player: Player, outlet: Outlet, block: int = 0):
         self.recording, self.outlet, self.asked_block = recording, outlet, block
+        self.audience = outlet.audience
         self.changed = Condition()  # guards the player; notified of commands and of what has been sent
         self.player, self.block = player, self._block(player)
         self.tally = Tally()
@@ -71,19 +96,27 @@ class Pacing:
         rest = f", {player.pending} still to send" if player.pending else ""
         return f"{sent} samples sent{rest}, the next is sample {player.next}", sent
 
-    def wait_for_subscribers(self, wanted: int, timeout: float) -> None:
-        """Wait until `wanted` subscribers listen, or a command comes, and have the test; raises SubscribersMissing."""
-        limit = time.perf_counter() + (timeout if wanted else DISCOVERY)
-        while self._waits() and not 0 < wanted <= self.outlet.subscribers():
+    def wait_for_subscribers(self, wanted: int, timeout: float, names: Sequence[str] = ()) -> None:
+        """Wait until `wanted` subscribers listen and the nodes of these names say that they are ready, or a command
+        comes, and until all have the test; raises SubscribersMissing."""
+        limit = time.perf_counter() + (timeout if wanted or names else DISCOVERY)
+        while self._waits() and not self._all_are_there(wanted, names):
             if time.perf_counter() > limit:
-                if wanted:
-                    raise SubscribersMissing(self._who_is_missing(wanted, timeout))
+                if wanted or names:
+                    raise SubscribersMissing(self._who_is_missing(wanted, timeout, names))
                 break
             self._send_state_if_due()
-            time.sleep(0.005)
+            time.sleep(WAITING)
         limit = time.perf_counter() + DISCOVERY
         while not (self.stopped or self.outlet.test_has_arrived()) and time.perf_counter() < limit:
             time.sleep(0.001)  # whatever command has come: samples without their test are lost on whom they reach
+        self.audience.forget_gone()
+
+    def _all_are_there(self, wanted: int, names: Sequence[str]) -> bool:
+        """False also where nobody is asked for: then there is a time in which to come."""
+        if not (wanted or names) or self.audience.ready() < wanted:
+            return False
+        return not self.audience.not_ready(names)
 
     def start(self, paused: bool = False, delay: float = 0.0) -> None:
         """After `delay` s play from the first sample, or wait for commands; where one has come already, it stands."""
@@ -110,21 +143,39 @@ class Pacing:
             else:
                 self.outlet.wait_for_room()
 
-    def finish(self) -> str:
-        """Let subscribers take what has been sent; one line on how it all went."""
+    def finish(self, timeout: float = 0.0) -> Outcome:
+        """Let subscribers take what has been sent and, up to `timeout` s, those who take part get what they lack."""
         self._send_state()
         limit = time.perf_counter() + (DISCOVERY if self.stopped else LAST_ACKNOWLEDGEMENT)
-        self.stopped = False  # a signal from now on ends the waiting here
+        player, stopped, self.stopped = self.player, self.stopped, False  # a signal from now on ends the waiting here
         while not (arrived := self.outlet.all_have_arrived()) and not self.stopped and time.perf_counter() < limit:
             time.sleep(0.001)
-        tally, player = self.tally, self.player
+        if not stopped:
+            self._wait_for_listeners(timeout)
+        lacking = [] if stopped else self.audience.lacking(player.run, player.next)
+        tally = self.tally
         finished = player.mode == Mode.FINISHED
-        return (
+        text = (
             ("finished" if finished else f"stopped before sample {player.next} of {len(self.recording)}")
             + f": {tally.samples} samples sent in {tally.messages} messages, rate {tally.rate:.4g} of {player.rate:g} "
             f"asked for, at worst {tally.worst_lateness * 1e3:.2f} ms late"
-            + ("" if arrived else "; a subscriber has not taken all of them")
+            + ("" if arrived or lacking else "; a subscriber has not taken all of them")
         )
+        return Outcome(text, lacking)
+
+    def _wait_for_listeners(self, timeout: float) -> None:
+        """Who has been stopped, or came late, asks for what he lacks: the samples can be had while this waits."""
+        began, said = time.perf_counter(), 0.0
+        while not self.stopped and (behind := self.audience.behind(self.player.run, self.player.next)):
+            waited = time.perf_counter() - began
+            if waited > timeout:
+                break
+            if waited > SAY_AFTER and (not said or waited - said > SAY_AGAIN):
+                said = waited
+                lines = "; ".join(self.audience.lacking(self.player.run, self.player.next)) or ", ".join(behind)
+                self.audience.warn(f"waiting up to {timeout - waited:.0f} s for who lacks samples: {lines}")
+            self._send_state_if_due()
+            time.sleep(WAITING)
 
     def _block(self, player: Player) -> int:
         channels = len(self.recording.test.channels)
@@ -133,11 +184,16 @@ class Pacing:
     def _waits(self) -> bool:
         return self.player.mode == Mode.WAITING and not self.stopped
 
-    def _who_is_missing(self, wanted: int, timeout: float) -> str:
-        there = sorted(self.outlet.subscriber_names())
+    def _who_is_missing(self, wanted: int, timeout: float, names: Sequence[str]) -> str:
+        there = ", ".join(sorted(self.audience.subscribed())) or "none"
+        if missing := self.audience.not_ready(names):
+            return (
+                f"after {timeout:g} s not ready: {', '.join(missing)} (on samples: {there}): start them, look at what "
+                "they say, or leave them out of listeners"
+            )
         return (
-            f"only {self.outlet.subscribers()} of {wanted} subscribers on samples after {timeout:g} s (there: "
-            f"{', '.join(there) or 'none'}): start the others, or lower wait_for"
+            f"only {self.audience.ready()} of {wanted} subscribers on samples after {timeout:g} s (there: "
+            f"{there}): start the others, or lower wait_for"
         )
 
     def _send_due(self, block: int) -> None:

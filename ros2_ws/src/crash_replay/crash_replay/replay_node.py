@@ -19,7 +19,7 @@ from std_srvs.srv import Trigger
 
 from .bag import read_bag
 from .console import Console, wanted
-from .pacing import Pacing, SubscribersMissing
+from .pacing import Outcome, Pacing, SubscribersMissing
 from .player import SECOND, CommandError, Player
 from .recording import RecordingError
 from .replay_parameters import LIVE, ParameterError, checked, declare_parameters, names_in, window_of
@@ -39,7 +39,7 @@ class ReplayNode(Node):
         recording = select_channels(read_bag(asked["bag"]), names_in(asked["channels"]), names_in(asked["exclude"]))
         window = samples_within(window_of(asked), recording.time_ns)
         player = Player(recording.time_ns, asked["rate"], asked["loop"], *window)
-        topics = ReplayTopics(self, recording, asked["clock"], asked["answer_timeout"] if asked["lockstep"] else None)
+        self.topics = topics = ReplayTopics(self, recording, asked["clock"], asked["answer_timeout"] if asked["lockstep"] else None)
         self.pacing = Pacing(recording, player, topics, self.asked["block"])
         for command in (Player.pause, Player.resume, Player.toggle):
             self.create_service(Trigger, f"~/{command.__name__}", self._on_trigger(command))
@@ -50,14 +50,15 @@ class ReplayNode(Node):
         serve_samples(self, recording)
         self.add_on_set_parameters_callback(self._on_parameters)
 
-    def replay(self) -> str:
-        """All of it, in the calling thread; one line on how it went."""
+    def replay(self) -> Outcome:
+        """All of it, in the calling thread."""
         keyboard, progress = (wanted(self.asked[k], s) for k, s in (("keyboard", sys.stdin), ("progress", sys.stderr)))
         with Console(self.pacing, self._set, keyboard, progress):
-            self.pacing.wait_for_subscribers(self.asked["wait_for"], self.asked["wait_timeout"])
+            names = names_in(self.asked["listeners"])
+            self.pacing.wait_for_subscribers(self.asked["wait_for"], self.asked["wait_timeout"], names)
             self.pacing.start(self.asked["start_paused"], self.asked["delay"])
             self.pacing.play(self.asked["keep_alive"])
-            return self.pacing.finish()
+            return self.pacing.finish(self.asked["finish_timeout"])
 
     def _set(self, values: dict[str, Any]) -> str:
         """Set parameters together; why not, or nothing."""
@@ -143,12 +144,16 @@ def main() -> int:
     services = Thread(target=spin, args=(executor, done))
     services.start()
     try:
-        print(node.replay(), flush=True)
-        return 0
+        outcome = node.replay()
+        print(outcome.text, flush=True)
+        for line in outcome.lacking:
+            print(f"incomplete: {line}", file=sys.stderr, flush=True)
+        return 1 if outcome.lacking else 0
     except SubscribersMissing as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
     finally:
+        node.topics.audience.leave()
         done.set_result(None)
         executor.wake()
         services.join()

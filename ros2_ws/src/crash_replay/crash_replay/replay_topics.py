@@ -8,13 +8,15 @@ from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rosgraph_msgs.msg import Clock
 
+from .attending import Progress
+from .audience import Audience
 from .flow import NOT_WAITING, Flow
 from .lockstep import Answered, Listeners, Lockstep
 from .player import SECOND, Batch, Mode, Player, Tally
 from .qos import LATCHED, SAID, STREAM
 from .recording import Recording
 from .ros_messages import channel_to_msg, channel_type, samples_to_msg, stamp, test_to_msg, time_zero_ns
-from .subscribers import UNNAMED, killed, node_name, process_of, waited_for
+from .subscribers import UNNAMED, node_name, process_of, waited_for
 
 OVERRIDABLE = QoSOverridingOptions.with_default_policies()
 
@@ -40,9 +42,11 @@ class ReplayTopics:
         self.acknowledged = 0  # samples
         self.lockstep = None
         if answer_timeout is not None:
-            self.lockstep = Lockstep(self._listeners, node.get_logger().warning, answer_timeout)
+            self.lockstep = Lockstep(self._answering, node.get_logger().warning, answer_timeout)
             self.answers = node.create_subscription(Answer, "answers", self._on_answer, SAID)
         self.last_time_ns = int(recording.time_ns[0])  # of the last sample sent
+        self.run, self.first = -1, 0  # the pass that is being sent, and its first sample
+        self.audience = Audience(node, self.samples)
         self.find_subscribers()
         self.test.publish(test_to_msg(recording))
 
@@ -67,7 +71,7 @@ class ReplayTopics:
         else:
             time.sleep(0.0005)
 
-    def _listeners(self) -> Listeners:
+    def _answering(self) -> Listeners:
         """Full names of the nodes that publish answers, but of those just found whose names are still to come.
 
         Only those whose subscription to the samples is found, too: else what is sent next would not reach them.
@@ -82,14 +86,6 @@ class ReplayTopics:
     def _on_answer(self, message: Answer) -> None:
         self.lockstep.answer(message.node, Answered(message.run, message.number, message.missed))
 
-    def subscribers(self) -> int:
-        """On `samples`, but of killed ones: one that the middleware has yet to forget stands for none still to come."""
-        return max(0, self.samples.get_subscription_count() - len(killed(self.node, self.samples.topic_name)))
-
-    def subscriber_names(self) -> list[str]:
-        """Nodes that listen to `samples`."""
-        return [info.node_name for info in self.node.get_subscriptions_info_by_topic(self.samples.topic_name)]
-
     def find_subscribers(self) -> None:
         """Look who listens: what nobody listens to is not made."""
         self.clock_heard = self.clock is not None and self.clock.get_subscription_count() > 0
@@ -102,6 +98,8 @@ class ReplayTopics:
 
     def send(self, batch: Batch) -> None:
         """The samples of a batch, the clock at the last of them, and each heard channel's values."""
+        if batch.run != self.run:
+            self.run, self.first = batch.run, batch.start
         if self.lockstep:
             self.lockstep.expect(batch.run, batch.stop - 1)
         message = samples_to_msg(self.recording, batch.start, batch.stop, batch.run, self.time_zero)
@@ -126,7 +124,7 @@ class ReplayTopics:
         self.find_subscribers()
         if self.flow.acknowledged():
             self.acknowledged = tally.samples
-        answers = self.lockstep.told() if self.lockstep else {}
+        reached = Progress(player.run, len(self.recording), player.next, done=player.mode == Mode.FINISHED)
         message = ReplayState(
             state=int(player.mode),
             run=player.run,
@@ -135,16 +133,14 @@ class ReplayTopics:
             sent=tally.samples,
             acknowledged=self.acknowledged,
             # who was killed is looked for only where there is time for it
-            subscribers=self.subscribers() if player.mode == Mode.WAITING else self.samples.get_subscription_count(),
+            subscribers=self.audience.ready() if player.mode == Mode.WAITING else self.samples.get_subscription_count(),
             time=self.last_time_ns / SECOND,
             rate_asked=player.rate,
             rate_actual=tally.rate,
             worst_lateness=tally.worst_lateness,
             block=block,
-            listener=list(answers),
-            answered_run=[told.run for told in answers.values()],
-            answered=[told.number for told in answers.values()],
-            missed=[told.missed for told in answers.values()],
+            first=self.first,
+            listeners=self.audience.look(reached),
         )
         message.header.stamp = stamp(self.time_zero + self.last_time_ns)
         self.state.publish(message)
