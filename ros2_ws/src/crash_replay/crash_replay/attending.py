@@ -1,13 +1,13 @@
 """A node's part in the attendance: it says its own words, hears those of the others and how far the replay has come."""
 
 import os
-import time
 from collections.abc import Callable
 from typing import NamedTuple
 
 from crash_msgs.msg import Attendance as Message
 from crash_msgs.msg import ReplayState
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.node import Node
 
 from .attendance import PERIOD, Attendance, Word
@@ -17,6 +17,9 @@ from .qos import EVERY_SAMPLE_SAID, LATCHED
 TOPIC = "attendance"
 REPLAY = "replay"
 """The role of the node that sends the samples."""
+
+HEARD = Duration(seconds=0.5)
+"""For the others to take the last word."""
 
 
 class Progress(NamedTuple):
@@ -46,20 +49,18 @@ class Attending:
             node.create_subscription(ReplayState, "replay_state", self._on_state, LATCHED)
         # not by the node's own clock, which may be the replay's and stand still
         node.create_timer(PERIOD, self.tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self.said_at = time.monotonic()
 
     def tell(self) -> None:
         """Say how far the node is."""
         self.own = self.own._replace(**self.progress()._asdict())
-        self.said_at = time.monotonic()
         self.out.publish(Message(**self.own._asdict()))
 
     def leave(self) -> str:
-        """The last word, as the node ends -> what its results lack, or ""."""
-        self.own = self.own._replace(**self.progress()._asdict(), leaving=True)
-        self.out.publish(Message(**self.own._asdict()))
-        own = self.own
-        if not own.total or (own.next >= own.total and not own.missing):
+        """The last word, as the node ends -> a line on what its results lack, or ""."""
+        own = self.own = self.own._replace(**self.progress()._asdict(), leaving=True)
+        self.out.publish(Message(**own._asdict()))
+        self.out.wait_for_all_acked(HEARD)  # what is left unsaid makes others think that it was killed
+        if not own.total or (own.done and not (own.missing or own.reason)):
             return ""
         why = own.reason or "ended before the rest came"
         return f"incomplete: {own.next - own.missing} of {own.total} samples ({why})"

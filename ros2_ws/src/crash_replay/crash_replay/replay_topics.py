@@ -139,7 +139,7 @@ class ReplayTopics:
             rate_actual=tally.rate,
             worst_lateness=tally.worst_lateness,
             block=block,
-            first=self.first,
+            first=self.first if player.run == self.run else player.next,
             listeners=self.audience.look(reached),
         )
         message.header.stamp = stamp(self.time_zero + self.last_time_ns)

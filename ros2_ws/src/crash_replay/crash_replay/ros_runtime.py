@@ -41,11 +41,12 @@ def run(
     make: Callable[[], Node],
     at_fault: tuple[type[Exception], ...],
     until: Callable[[Node], Future] = lambda node: Future(),
-    close: Callable[[Node], None] = lambda node: None,
+    close: Callable[[Node], str | None] = lambda node: None,
 ) -> int:
     """Make a node and run it until the future is done or a signal ends it -> exit status.
 
-    at_fault: what data, model or parameters raise: one line on standard error, exit status 1; close: called at the end.
+    at_fault: what data, model or parameters raise: one line on standard error, exit status 1; close: called at the end,
+    gives a line on what is incomplete, which then is the exit status as well.
     """
     acknowledge_promptly()
     # A signal must end the node between two callbacks, not take the context away under the executor.
@@ -53,7 +54,7 @@ def run(
     signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: signals.append(number))
-    node, executor = None, EventsExecutor()
+    node, executor, incomplete = None, EventsExecutor(), None
     try:
         node = make()
         done = until(node)
@@ -74,7 +75,8 @@ def run(
     finally:
         executor.shutdown()  # before the node: it holds the node's events, and a late end of it crashes the process
         if node is not None:
-            close(node)
+            if incomplete := close(node):
+                print(incomplete, file=sys.stderr, flush=True)
             node.destroy_node()
         rclpy.try_shutdown()
-    return 0
+    return 1 if incomplete else 0

@@ -20,15 +20,17 @@ class Waiting:
     arrival: Arrival
     run: int
     stamp_ns: int  # of the first of them
+    first: int  # number of the pass's first sample
     sent_again: int = 0  # samples that were missing before them and have been got since
     without: bool = False  # what is missing cannot be had
+    begun: bool = False  # the pass that begins with them has been begun
 
 
 class Arrivals:
     """Counts on from what has come."""
 
     def __init__(self):
-        self.run, self.next = 0, 0
+        self.run, self.first, self.next = 0, 0, 0  # the pass, its first sample, the next one
         self.begun = False
         self.missed = 0  # lost ones, in all
 
@@ -36,7 +38,7 @@ class Arrivals:
         """A pass begins with another run, or with sample 0: a replay that was started anew begins at run 0 again."""
         begins = not self.begun or run != self.run or rows.number == 0
         if begins:
-            self.run, self.next, self.begun = run, rows.number, True
+            self.run, self.first, self.next, self.begun = run, rows.number, rows.number, True
         lost, repeated = max(0, rows.number - self.next), min(max(0, self.next - rows.number), len(rows.time_ns))
         self.missed += lost
         self.next = max(self.next, rows.end)

@@ -67,3 +67,13 @@ class Follower:
         self.position, self.state = rows.end, state
         self.checkpoints.offer(self.position, state)
         return columns
+
+    def again(self, start: int, stop: int) -> Columns:
+        """The estimates of samples start, ..., stop - 1, which have been seen, once more; the follower stays where it is.
+
+        Raises FilterFailure.
+        """
+        number, state = self.checkpoints.before(start)
+        for rows in self.kept.runs(max(number, self.floor), start, self.checkpoints.stride):
+            state, _ = follow(self.estimator, state, rows)
+        return follow(self.estimator, state, self.kept.rows(start, stop))[1]

@@ -7,23 +7,28 @@ from crash_msgs.srv import GetSamples
 from rclpy.node import Node
 from rclpy.task import Future
 
+from crash_replay.attending import Attending
+
 from ..kept import Rows
 from .samples import rows_of
 
 PATIENCE = 10.0
-"""s of wall clock for an answer; a replay that has ended is gone before."""
+"""s of wall clock for an answer; then it is asked for again, where the replay is there by its own word."""
+STAYS = 300.0
+"""s for which a replay that is there and does not answer, because it was stopped, is asked again and again."""
 DISCOVERY = 1.0
 """s after the test has come in which the replay's service may still be found: topics are found before it."""
 
 
 class Asking:
-    def __init__(self, node: Node, service: str, done: Callable[[Rows | None], None]):
-        """done: called with the samples, or with None where there are none to be had."""
-        self.node, self.done = node, done
+    def __init__(self, node: Node, service: str, attending: Attending, done: Callable[[Rows | None], None]):
+        """done: called with the samples, or with None where there are none to be had, and `why_not` says why."""
+        self.node, self.attending, self.done = node, attending, done
+        self.why_not = ""
         self.client = node.create_client(GetSamples, service)
         self.wanted: GetSamples.Request | None = None
         self.call: Future | None = None  # None: nothing is wanted, or the service not found yet
-        self.test_came = self.asked = 0.0  # monotonic s
+        self.test_came = self.began = self.asked = 0.0  # monotonic s: when the test came, when it was asked first, last
         node.create_timer(0.05, self._look)
 
     @property
@@ -37,14 +42,26 @@ class Asking:
 
     def ask(self, start: int, stop: int) -> bool:
         """False: there is nobody to ask."""
-        self.wanted = GetSamples.Request(start=start, stop=stop)
+        self.wanted, self.began = GetSamples.Request(start=start, stop=stop), time.monotonic()
         self._call_if_found()
         if not self.call and self._in_vain():
-            self.wanted = None
+            self._forget()
         return self.busy
 
     def _in_vain(self) -> bool:
-        return time.monotonic() - self.test_came > DISCOVERY
+        """Whether there is nothing to wait for any more; `why_not` then says it."""
+        now, there = time.monotonic(), self.attending.replay_is_there()
+        if there is None:  # a replay that says nothing of itself, or none
+            if self.call:
+                late = now - self.asked > PATIENCE or not self.client.service_is_ready()
+            else:
+                late = now - self.test_came > DISCOVERY
+            self.why_not = "nobody can give them again" if late else ""
+        elif not there:
+            self.why_not = "the replay had ended"
+        else:
+            self.why_not = f"the replay has not answered for {STAYS:g} s" if now - self.began > STAYS else ""
+        return bool(self.why_not)
 
     def _call_if_found(self) -> None:
         if self.client.service_is_ready():
@@ -62,18 +79,22 @@ class Asking:
             return
         self._forget()
         response = call.result()
-        if not response.success:
-            self.node.get_logger().warning(f"{self.client.srv_name}: {response.message}")
-        self.done(rows_of(response.samples) if response.success else None)
+        self.why_not = "" if response.success else response.message or "refused"
+        if self.why_not:
+            self.node.get_logger().warning(f"{self.client.srv_name}: {self.why_not}")
+        self.done(None if self.why_not else rows_of(response.samples))
 
     def _look(self) -> None:
         if not self.wanted:
             return
-        if not self.call:
-            self._call_if_found()
-        late = time.monotonic() - self.asked > PATIENCE or not self.client.service_is_ready()
-        if late if self.call else self._in_vain():
+        if self._in_vain():
             if self.call:
-                self.node.get_logger().warning(f"{self.client.srv_name} has not answered: going on without")
+                self.node.get_logger().warning(f"{self.client.srv_name}: {self.why_not}: going on without")
             self._forget()
             self.done(None)
+        elif not self.call:
+            self._call_if_found()
+        elif time.monotonic() - self.asked > PATIENCE:  # the call or its answer was lost with who was stopped
+            self.client.remove_pending_request(self.call)
+            self.call = None
+            self._call_if_found()

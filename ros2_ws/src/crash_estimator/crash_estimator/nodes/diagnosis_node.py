@@ -12,8 +12,8 @@ from crash_msgs.msg import Samples, TestInfo
 from crash_msgs.srv import AddEffect, RemoveEffect
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
-from rclpy.subscription import Subscription
 
+from crash_replay.attending import Attending, Progress
 from crash_replay.bag import read_bag
 from crash_replay.qos import EVERY_SAMPLE, LATCHED
 from crash_replay.recording import RecordingError
@@ -29,6 +29,7 @@ from ..core.structure import ModelError, Structure
 from ..kept import Kept, Rows
 from ..model_file import load_model, ready_models
 from .asking import Asking
+from .catching_up import CatchingUp
 from .channel_feed import ChannelFeed
 from .diagnosis_messages import Moment
 from .diagnosis_telling import Telling
@@ -66,19 +67,25 @@ class DiagnosisNode(Node):
         self.time_zero = 0  # stamp of the impact, ns
         self.run, self.total, self.end = 0, 0, 0  # samples of the test; number of the next sample
         self.asked: Moment | None = None  # what the last task is, or was, about; None: something has changed since
-        self.stopped = False  # by what nothing can be said about
-        self.cannot_be_had = False  # what was missed in this pass
+        self.stopped = ""  # why nothing can be said
+        self.cannot_be_had = ""  # why, of what was missed in this pass
+        self.at_fault = ""  # why nothing is diagnosed on this test
+        self.prepared = False  # its process has compiled its code
+        self.rest_of = 0  # the pass that what has not come is asked of
         self.finals: dict[tuple[int, int], LiveAnswer] = {}  # by revision and samples missing
         self.telling = Telling(self, self.structure)
         self.worker = Worker(self.structure, effects, self.bags)
         self.also_add = {name: self.create_client(AddEffect, f"{name}/add_effect") for name in estimators if name}
         self.create_service(AddEffect, "~/add_effect", self._on_add_effect)
         self.create_service(RemoveEffect, "~/remove_effect", self._on_remove_effect)
-        self.asking = Asking(self, f"{replay}/get_samples", self._on_samples_again)
+        self.attending = Attending(self, "diagnosis", self._progress)
+        self.asking = Asking(self, f"{replay}/get_samples", self.attending, self._on_samples_again)
+        self.catching_up = CatchingUp(self, self.attending, self._place, self._ask_for_rest)
         self.feed = ChannelFeed(self, "samples", self._on_feed_begins, self._on_feed)
         self.create_subscription(TestInfo, "test", self._on_test, LATCHED)
-        self.samples_in: Subscription | None = None  # a replay that waits for it begins when answers can come
+        self.create_subscription(Samples, "samples", self._on_samples, EVERY_SAMPLE)
         self.create_timer(LOOK, self._look)
+        self.attending.tell()
 
     def _declared(self, name: str, default, description: str):
         return self.declare_parameter(name, default, ParameterDescriptor(description=description)).value
@@ -91,15 +98,17 @@ class DiagnosisNode(Node):
 
     def _on_test(self, message: TestInfo) -> None:
         self._begin_anew()
-        self.kept, self.finals = None, {}
+        self.kept, self.finals, self.at_fault = None, {}, ""
+        self.total, self.run, self.end = message.samples, -1, 0
         self.telling.begin_test()
         try:
             test = test_from_msg(message)
             Kinematics(self.structure, test)
         except (ModelError, RecordingError) as error:
-            self.get_logger().error(f"{error}; nothing is diagnosed on this test")
+            self.at_fault = " ".join(str(error).split())
+            self.get_logger().error(f"{self.at_fault}; nothing is diagnosed on this test")
             return
-        self.kept, self.total, self.end = Kept(test, message.samples), message.samples, 0
+        self.kept = Kept(test, message.samples)
         self.time_zero = stamp_ns(message.time_zero)
         name = self.telling.name(self.structure)
         self.get_logger().info(f"test {test.id}: model {name}, with {len(self.bags)} other recordings")
@@ -108,6 +117,7 @@ class DiagnosisNode(Node):
     def _on_samples(self, message: Samples) -> None:
         if self.kept is None or not message.time_ns:
             return
+        self.catching_up.came()
         try:
             rows = rows_of(message)
             self.kept.put_rows(rows)
@@ -134,28 +144,53 @@ class DiagnosisNode(Node):
             self.kept.put_rows(rows)
             self.end = max(self.end, rows.end)
 
+    def _place(self) -> tuple[int, int] | None:
+        """What has come of the test, where more may be asked for."""
+        free = self.kept is not None and not (self.asking.busy or self.cannot_be_had)
+        return (self.run, self.end) if free else None
+
+    def _ask_for_rest(self, run: int, start: int, stop: int) -> None:
+        self.rest_of = run
+        if not self.asking.ask(start, stop):
+            self.cannot_be_had = self.asking.why_not
+
     def _on_samples_again(self, rows: Rows | None) -> None:
         if rows is None:
-            self.cannot_be_had = True
+            self.cannot_be_had = self.asking.why_not
         elif self.kept is not None:
             self.kept.put_rows(rows)
+            if rows.end > self.end or self.run != self.rest_of:
+                self.run, self.end = self.rest_of, rows.end
+            self.catching_up.ask_at_once()
 
     def _begin_anew(self) -> None:
         """What was asked is no longer the question."""
-        self.asked, self.stopped, self.cannot_be_had = None, False, False
+        self.asked, self.stopped, self.cannot_be_had = None, "", ""
         self.asking.begin_test()
         self.telling.begin_pass()
         self.worker.drop()
+
+    def _progress(self) -> Progress:
+        """What there is to say on `attendance`."""
+        if self.kept is None:
+            said = Progress(total=self.total, next=self.total, done=bool(self.total), reason=self.at_fault)
+            return said._replace(ready=self.prepared)
+        missing = self.kept.missing(self.end)
+        final = self.asked is not None and self.asked.final and not self.worker.busy
+        why = self.stopped or (self.cannot_be_had if missing or self.end < self.total else "")
+        done = final or bool(self.stopped)
+        return Progress(self.run if self.run >= 0 else 0, self.total, self.end, missing, done, why, self.prepared)
 
     # what is asked and said
 
     def _look(self) -> None:
         """Take the answer that has come, and ask the next question."""
-        if self.samples_in is None and not self.worker.busy:
-            self.samples_in = self.create_subscription(Samples, "samples", self._on_samples, EVERY_SAMPLE)
+        if not (self.prepared or self.worker.busy):
+            self.prepared = True
+            self.attending.tell()
         reply = self.worker.reply()
         if reply is not None and reply.error:
-            self.stopped = True
+            self.stopped = reply.error
             self.get_logger().error(f"{reply.error}; no more is said until the test, the pass or the model changes")
         elif reply is not None and reply.answer is not None:
             self._conclude(self.asked, reply.answer)
@@ -179,14 +214,16 @@ class DiagnosisNode(Node):
     def _has_enough(self) -> bool:
         """Whether next to no sample is missing; asks for those that are."""
         gap = self.kept.gap(0, self.end)
-        if gap and not self.cannot_be_had and self.asking.ask(*gap):
-            return False
+        if gap and not self.cannot_be_had:
+            self.rest_of = self.run
+            if self.asking.ask(*gap):
+                return False
+            self.cannot_be_had = self.asking.why_not
         missing = self.kept.missing(self.end)
-        self.stopped = missing > TOLERATED * self.end
-        if self.stopped:
+        if missing > TOLERATED * self.end:
+            self.stopped = f"{missing} of {self.end} samples were not seen"
             self.get_logger().warning(
-                f"{missing} of {self.end} samples were not seen: nothing is said on this pass; "
-                "seek to the start for a whole one"
+                f"{self.stopped}: nothing is said on this pass; seek to the start for a whole one"
             )
         return not self.stopped
 
@@ -194,6 +231,10 @@ class DiagnosisNode(Node):
         self.telling.tell(at, answer, self.kept, self.time_zero)
         if not at.final:
             return
+        self._add_found(at, answer)
+        self.attending.tell()
+
+    def _add_found(self, at: Moment, answer: LiveAnswer) -> None:
         self.finals[at.revision, self.kept.missing(at.number + 1)] = answer
         if self.adds and answer.found:
             self.adds = False
@@ -236,7 +277,8 @@ class DiagnosisNode(Node):
 
 
 def main() -> int:
-    return run(DiagnosisNode, (ModelError, RecordingError, WorkerError))
+    at_fault = (ModelError, RecordingError, WorkerError)
+    return run(DiagnosisNode, at_fault, close=lambda node: node.attending.leave())
 
 
 if __name__ == "__main__":

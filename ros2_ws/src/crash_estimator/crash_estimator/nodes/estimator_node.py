@@ -6,7 +6,6 @@ Several run side by side under different names (`--ros-args -r __node:=mrls`).
 """
 
 import sys
-from collections import deque
 from collections.abc import Callable
 
 from crash_msgs.msg import Samples, TestInfo
@@ -15,25 +14,27 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from crash_replay.attending import Attending, Progress
 from crash_replay.qos import EVERY_SAMPLE, LATCHED, UNLATCHED
 from crash_replay.recording import RecordingError
-from crash_replay.ros_messages import test_from_msg
+from crash_replay.ros_messages import stamp_ns, test_from_msg
 from crash_replay.ros_runtime import run
 
 from ..core.effects.change import remove_effect
 from ..core.methods import METHODS
 from ..core.structure import ModelError, Structure
 from ..following.again import estimated_again
-from ..following.arrivals import Arrivals, Waiting, missing_text
+from ..following.arrivals import Waiting, missing_text
 from ..following.columns import FilterFailure
 from ..following.follower import Follower
 from ..kept import Kept, Rows
 from ..model_file import ready_models
-from .asking import Asking
 from .channel_feed import ChannelFeed
 from .effect_requests import with_effect
+from .estimates_again import EstimatesAgain
 from .estimator_model import EstimatorModel
 from .estimator_topics import EstimatorTopics
+from .intake import Intake
 from .samples import MOST, Received, received, rows_of, what_is_wrong
 
 
@@ -54,18 +55,20 @@ class EstimatorNode(Node):
         self.test_message: TestInfo | None = None
         self.unlatched: TestInfo | None = None  # come by itself, and to come once more if its publisher latches
         self.follower: Follower | None = None  # None: no test yet, or one that the model does not fit
-        self.arrivals, self.waiting = Arrivals(), deque[Waiting]()
-        self.stopped = False  # by numbers that no filter can go on with, until the next pass
-        self.asked_again = 0  # samples
+        self.stopped = ""  # why no filter can go on with these numbers, until the next pass
+        self.at_fault = ""  # why nothing is estimated on this test
         self.topics = EstimatorTopics(self)
+        self.again = EstimatesAgain(self)
+        self.attending = Attending(self, "estimator", self._progress)
+        self.intake = Intake(self, f"{replay}/get_samples", self.attending, self)
         self.create_service(Trigger, "~/reset", self._on_reset)
         self.create_service(AddEffect, "~/add_effect", self._on_add_effect)
         self.create_service(RemoveEffect, "~/remove_effect", self._on_remove_effect)
-        self.asking = Asking(self, f"{replay}/get_samples", self._on_samples_again)
         self.feed, self.feed_run = ChannelFeed(self, "samples", self._on_feed_begins, self._on_feed), -1
         self.create_subscription(TestInfo, "test", self._on_test, LATCHED)
         self.create_subscription(TestInfo, "test", self._on_unlatched_test, UNLATCHED)
         self.create_subscription(Samples, "samples", self._on_samples, EVERY_SAMPLE, raw=True)
+        self.attending.tell()
 
     def _declared(self, name: str, default, description: str):
         return self.declare_parameter(name, default, ParameterDescriptor(description=description)).value
@@ -83,25 +86,27 @@ class EstimatorNode(Node):
             self._begin_test(message)
 
     def _begin_test(self, message: TestInfo) -> None:
-        self.test_message, self.follower = message, None
-        self._forget_waiting()
-        self.arrivals = Arrivals()
+        self.test_message, self.follower, self.stopped, self.at_fault = message, None, "", ""
+        self.intake.begin_test(listening=False)
         try:
             test = test_from_msg(message)
             estimator = self.model.estimator(self.model.structure, test)
         except (ModelError, RecordingError) as error:
-            self.get_logger().error(f"{error}; nothing is estimated on this test")
+            self.at_fault = " ".join(str(error).split())
+            self.get_logger().error(f"{self.at_fault}; nothing is estimated on this test")
             return
         self.follower = Follower(estimator, Kept(test, message.samples))
-        self.topics.begin(estimator.description, self.model.revision, message.time_zero)
+        self.intake.begin_test(listening=True)
+        self.again.begin_test(stamp_ns(message.time_zero))
+        self._say_from_now_on(message)
         self.get_logger().info(f"test {test.id}: model {self.model.structure.name}, method {self.model.method}")
         self.feed.set_test(message)
 
     def _on_samples(self, raw: bytes) -> None:
         message = received(raw)
         if self.follower is None or not self._fits(message):
-            return self._answer(message.run, message.number + max(0, len(message.time_ns) - 1))
-        self._receive(message.run, rows_of(message), message.stamp_ns)
+            return self.leave_out(message.run, message.number + max(0, len(message.time_ns) - 1))
+        self.intake.receive(message.run, rows_of(message), message.stamp_ns)
 
     def _fits(self, message: Received) -> bool:
         wrong = what_is_wrong(message, len(self.follower.kept.test.channels), self.test_message.samples)
@@ -119,55 +124,47 @@ class EstimatorNode(Node):
 
     def _on_feed(self, rows: Rows) -> None:
         if self.follower and rows.end <= MOST:
-            self._receive(self.feed_run, rows, self.topics.time_zero + int(rows.time_ns[0]))
+            self.intake.receive(self.feed_run, rows, self.stamp_of(rows))
 
-    def _receive(self, run: int, rows: Rows, stamp_ns: int) -> None:
-        arrival = self.arrivals.receive(run, rows)
-        if arrival.repeated:
-            self.get_logger().warning(
-                f"samples from number {rows.number} come after number {rows.number + arrival.repeated - 1}: what was "
-                "seen before is left out; is there a second replay?"
-            )
-            if not len(arrival.rows.time_ns):
-                return self._answer(run, rows.end - 1)
-            stamp_ns += int(arrival.rows.time_ns[0] - rows.time_ns[0])
-        self.follower.keep(arrival.rows)
-        self.waiting.append(Waiting(arrival, run, stamp_ns))
-        self._work()
+    # what is done with the samples, in their order: the intake's consumer
 
-    def _on_samples_again(self, rows: Rows | None) -> None:
-        head = self.waiting[0]
-        if rows is None:
-            head.without = True
-        else:
-            self.follower.keep(rows)
-            head.sent_again += len(rows.time_ns)
-            self.asked_again += len(rows.time_ns)
-        self._work()
-
-    def _forget_waiting(self) -> None:
-        self.asking.begin_test()
-        self.waiting.clear()
-        self.stopped = False
-
-    def _work(self) -> None:
-        """Estimate what waits, unless what was missed before it may still come."""
-        while self.waiting and not self.asking.busy:
-            head = self.waiting[0]
-            if head.arrival.begins:
-                self.stopped = False
-                self._go_back_before_reset()
-            gap = None if self.stopped or head.without else self.follower.gap(head.arrival.rows.number)
-            if gap and self.asking.ask(*gap):
-                return
-            self._tell_of_missing(head)
-            self._estimate(head)
-            self.waiting.popleft()
-            self._answer(head.run, head.arrival.rows.end - 1)
-
-    def _go_back_before_reset(self) -> None:
-        if self.follower.floor:
+    def begin_pass(self) -> None:
+        self.stopped = ""
+        if self.follower.floor:  # what was reset
             self.follower = Follower(self.follower.estimator, self.follower.kept)
+            self.again.begin(self.follower, self.model.revision)
+
+    def keep(self, rows: Rows) -> None:
+        self.follower.keep(rows)
+
+    def gap(self, number: int) -> tuple[int, int] | None:
+        return None if self.stopped else self.follower.gap(number)
+
+    def take(self, samples: Waiting) -> None:
+        self._tell_of_missing(samples)
+        self._estimate(samples)
+        self.leave_out(samples.run, samples.arrival.rows.end - 1)
+
+    def leave_out(self, run: int, number: int) -> None:
+        self.topics.answer(run, number, self.intake.arrivals.missed)
+
+    def stamp_of(self, rows: Rows) -> int:
+        return self.topics.time_zero + int(rows.time_ns[0])
+
+    def _progress(self) -> Progress:
+        """What there is to say on `attendance`."""
+        test, follower = self.test_message, self.follower
+        if test is None:
+            return Progress()
+        if follower is None:
+            return Progress(total=test.samples, next=test.samples, done=True, reason=self.at_fault)
+        arrivals, number = self.intake.arrivals, self.intake.next
+        state = self.attending.replay_state
+        sent = state.number if state and state.state == state.FINISHED and state.run == arrivals.run else test.samples
+        missing = follower.kept.missing(number)
+        reason = self.stopped or (self.intake.why_not if missing or self.intake.refused else "")
+        through = number >= sent and not (self.intake.waiting or self.topics.later.waiting)
+        return Progress(arrivals.run, test.samples, number, missing, done=through, reason=reason)
 
     def _estimate(self, samples: Waiting) -> None:
         if self.stopped:
@@ -175,15 +172,12 @@ class EstimatorNode(Node):
         try:
             columns = self.follower.follow(samples.arrival.rows)
         except FilterFailure as failure:
-            self.stopped, columns = True, failure.done
+            self.stopped, columns = str(failure), failure.done
             self.get_logger().error(
                 f"{failure}; it starts again with the next pass over the test, or with the service ~/reset"
             )
         if columns:
             self.topics.estimates(samples.run, columns, samples.stamp_ns)
-
-    def _answer(self, run: int, number: int) -> None:
-        self.topics.answer(run, number, self.arrivals.missed)
 
     def _tell_of_missing(self, samples: Waiting) -> None:
         """Say what did not come before these samples, and what the estimates rest on."""
@@ -199,7 +193,7 @@ class EstimatorNode(Node):
         self._publish_state(samples.run, number, samples.stamp_ns)
 
     def _publish_state(self, run: int, number: int, stamp_ns: int) -> None:
-        counts = {"missed": self.arrivals.missed, "asked_again": self.asked_again}
+        counts = {"missed": self.intake.arrivals.missed, "asked_again": self.intake.asked_again}
         self.topics.tell_state(self.model, run, number, stamp_ns, holds_from=self.follower.holds_from(number), **counts)
 
     def _on_add_effect(self, request: AddEffect.Request, response: AddEffect.Response) -> AddEffect.Response:
@@ -226,7 +220,7 @@ class EstimatorNode(Node):
             response.message = f"{failure}: model {self.model.structure.name} stays as it is"
             return response
         self.model.revise(structure)
-        self.stopped = False
+        self.stopped = ""
         name = f"revision {self.model.revision}: {structure.name} with {', '.join(self.model.effects()) or 'no effect'}"
         response.success, response.message = True, name + (f"; {done}" if done else "")
         self.get_logger().info(response.message)
@@ -237,25 +231,30 @@ class EstimatorNode(Node):
         return response
 
     def _tell_of_change(self, text: str) -> None:
-        number, run, revision = self.follower.position, self.arrivals.run, self.model.revision
-        self.topics.begin(self.follower.estimator.description, revision, self.test_message.time_zero)
+        number, run, revision = self.follower.position, self.intake.arrivals.run, self.model.revision
+        self._say_from_now_on(self.test_message)
         at = self.topics.time_zero + int(self.follower.kept.time_ns[max(0, number - 1)])
         self.topics.event("effect", "model", float(revision), text, run, number, at)
         self._publish_state(run, number, at)
 
+    def _say_from_now_on(self, test: TestInfo) -> None:
+        """What is said comes from the present model."""
+        self.again.begin(self.follower, self.model.revision)
+        self.topics.begin(self.follower.estimator.description, self.model.revision, test.time_zero)
+
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self.follower:
-            waiting = list(self.waiting)
-            self._forget_waiting()
-            self.follower = Follower(self.follower.estimator, self.follower.kept, floor=self.arrivals.next)
+            waiting, self.stopped = self.intake.forget_waiting(), ""
+            self.follower = Follower(self.follower.estimator, self.follower.kept, floor=self.intake.arrivals.next)
+            self.again.begin(self.follower, self.model.revision)
             for samples in waiting:  # a replay in lock-step goes on
-                self._answer(samples.run, samples.arrival.rows.end - 1)
+                self.leave_out(samples.run, samples.arrival.rows.end - 1)
         response.success, response.message = True, "the next sample starts from the model's initial values"
         return response
 
 
 def main() -> int:
-    return run(EstimatorNode, (ModelError, RecordingError))
+    return run(EstimatorNode, (ModelError, RecordingError), close=lambda node: node.attending.leave())
 
 
 if __name__ == "__main__":
