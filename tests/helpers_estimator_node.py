@@ -1,6 +1,7 @@
 """Estimator nodes in this process, on a ROS domain of their own, fed by a publisher of the test's own."""
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -24,7 +25,7 @@ from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.model_file import load_model
 from crash_estimator.nodes.estimator_node import EstimatorNode
-from crash_replay.qos import LATCHED, STREAM
+from crash_replay.qos import EVERY_SAMPLE, LATCHED, STREAM
 from crash_replay.recording import Recording
 from crash_replay.ros_messages import samples_to_msg, test_to_msg
 
@@ -64,8 +65,9 @@ class Stage:
 
     def close(self) -> None:
         for process in self.processes:
+            process.send_signal(signal.SIGCONT)
             process.terminate()
-            process.wait(60)
+            process.communicate(timeout=60)
         self.executor.shutdown()
         for node in (*self.estimators, self.node):
             node.destroy_node()
@@ -107,23 +109,28 @@ class Stage:
             self.samples.publish(samples_to_msg(recording, first, min(first + block, stop), run, TIME_ZERO))
             self.executor.spin_once(timeout_sec=0.0)
 
-    def replay(self, bag: Path, **parameters) -> subprocess.Popen:
+    def replay(self, bag: Path, stderr: int | None = None, **parameters) -> subprocess.Popen:
         """Start the real replay, one sample a message."""
         self.node.create_subscription(ReplayState, "replay_state", self.replayed.append, LATCHED)
-        return self.start("crash_replay.replay_node", bag=bag, **{"block": 1} | parameters)
+        return self.start("crash_replay.replay_node", stderr=stderr, bag=bag, **{"block": 1} | parameters)
+
+    def listen_to_samples(self) -> None:
+        """To be one whom a replay waits for, so that it does not begin before the stage has found all others."""
+        self.node.create_subscription(Samples, "samples", lambda message: None, EVERY_SAMPLE)
 
     def wait_until_found(self, subscribers: int, patience: float = PATIENCE) -> None:
         """Until the replay has found so many of them; a command that comes before would end its waiting."""
         found = lambda: self.replayed and self.replayed[-1].subscribers == subscribers  # noqa: E731
         self.spin_until(found, f"the replay has found {subscribers} subscribers", patience)
 
-    def start(self, module: str, name: str = "", **parameters) -> subprocess.Popen:
+    def start(self, module: str, name: str = "", stderr: int | None = None, **parameters) -> subprocess.Popen:
         """A node in a process of its own, ended with the stage."""
         command = [sys.executable, "-m", module, "--ros-args", *(["-r", f"__node:={name}"] if name else [])]
         for key, value in parameters.items():
             command += ["-p", f"{key}:={str(value).lower() if isinstance(value, bool) else value}"]
         environment = os.environ | {"ROS_DOMAIN_ID": str(self.domain)}
-        self.processes.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, env=environment))
+        piped = {"stdout": subprocess.DEVNULL, "stderr": stderr, "text": True}
+        self.processes.append(subprocess.Popen(command, env=environment, **piped))
         return self.processes[-1]
 
     def listen(self, name: str) -> dict[str, list]:
