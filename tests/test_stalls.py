@@ -1,4 +1,4 @@
-"""Processes that are stopped for longer than the middleware's lease, or killed: the results are whole, or it is said."""
+"""Processes that are stopped for long, or killed: the results are whole, or it is said."""
 
 import signal
 import subprocess
@@ -20,8 +20,8 @@ from crash_replay.qos import SAID
 BAGS = Path(__file__).resolve().parent.parent / "bags"
 BAG = BAGS / "frontal_engine_cab.mcap"
 MODEL = "frontal_engine_cab"
-LEASE = 5.0
-"""s after which the middleware drops who says nothing: crash_replay/fastdds.xml."""
+STOPPED = 8.0
+"""s: longer than the replay's 2 s, and than silence takes to be noticed."""
 
 
 @pytest.fixture(scope="module")
@@ -55,12 +55,12 @@ def test_who_was_stopped_until_the_last_sample_was_long_sent_has_all_of_them_in_
     stage.listen_to_samples()
     victim, replay = victim_and_replay(stage)
     victim.send_signal(signal.SIGSTOP)
-    stage.spin(LEASE + 4.0)  # the last sample goes out 2 s after the first
+    stage.spin(STOPPED)
     assert replay.poll() is None, "it stays for who is stopped"
     victim.send_signal(signal.SIGCONT)
     status, said = ended(stage, replay)
     assert status == 0, said
-    assert "/victim stopped for 5 s" in said and "/victim is back" in said and "incomplete" not in said
+    assert "/victim stopped for 5 s" in said and "incomplete" not in said
     messages = sorted(stage.heard["victim"]["parameters"], key=lambda message: message.number)
     assert numbers(messages) == list(range(len(whole)))
     assert_array_equal(joined(messages, "value")[:, : whole.shape[1]], whole)
@@ -86,7 +86,7 @@ def test_who_stays_away_is_not_waited_for_without_end(stage):
     status, said = ended(stage, replay)
     victim.send_signal(signal.SIGCONT)
     assert status == 1
-    assert "incomplete: /victim has " in said and " of 1901 samples (stopped for " in said
+    assert "incomplete: /victim has " in said and " of 1901 samples (" in said
     # and it says itself what it lacks, once the replay has gone
     victim.send_signal(signal.SIGINT)
     stage.spin_until(lambda: victim.poll() is not None, "it has ended")
@@ -97,7 +97,7 @@ def test_a_replay_that_was_stopped_goes_on_and_nothing_is_missing(stage, whole):
     stage.listen_to_samples()
     victim, replay = victim_and_replay(stage)
     replay.send_signal(signal.SIGSTOP)
-    stage.spin(LEASE + 3.0)
+    stage.spin(STOPPED)
     replay.send_signal(signal.SIGCONT)
     status, said = ended(stage, replay)
     assert status == 0, said
@@ -120,7 +120,7 @@ def test_a_diagnosis_that_was_stopped_gives_the_same_answer(stage):
         stage.spin_until(lambda: answers, "the diagnosis has begun", 4 * PATIENCE)
         if stop:
             diagnosis.send_signal(signal.SIGSTOP)
-            stage.spin(LEASE + 3.0)
+            stage.spin(STOPPED)
             diagnosis.send_signal(signal.SIGCONT)
         status, said = ended(stage, replay)
         assert status == 0, said

@@ -10,9 +10,11 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-from .attendance import PERIOD, Attendance, Word
+from .attendance import PERIOD, Attendance, State, Word
+from .obituary import announce_end
 from .processes import this_host
 from .qos import EVERY_SAMPLE_SAID, LATCHED
+from .subscribers import node_name, process_of
 
 TOPIC = "attendance"
 REPLAY = "replay"
@@ -39,21 +41,37 @@ class Attending:
 
     def __init__(self, node: Node, role: str, progress: Callable[[], Progress]):
         """progress: asked for at each word; before the first it must answer."""
-        self.progress = progress
+        self.node, self.progress = node, progress
         self.own = Word(node.get_fully_qualified_name(), role, this_host(), os.getpid())
         self.others = Attendance()
         self.replay_state: ReplayState | None = None
+        self.buried: set[Word] = set()  # the last words of those whose end has been announced
         self.out = node.create_publisher(Message, TOPIC, LATCHED)
         node.create_subscription(Message, TOPIC, self._on_word, EVERY_SAMPLE_SAID)
         if role != REPLAY:
             node.create_subscription(ReplayState, "replay_state", self._on_state, LATCHED)
         # not by the node's own clock, which may be the replay's and stand still
-        node.create_timer(PERIOD, self.tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        node.create_timer(PERIOD, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def tell(self) -> None:
         """Say how far the node is."""
         self.own = self.own._replace(**self.progress()._asdict())
         self.out.publish(Message(**self.own._asdict()))
+
+    def _look(self) -> None:
+        self.tell()
+        self._bury_killed()
+
+    def _bury_killed(self) -> None:
+        """See to it that nobody waits for what a process that was killed has not taken."""
+        killed = {name for name in self.others.names() if self.others.state(name) == State.KILLED}
+        killed = {name for name in killed if self.others.word(name) not in self.buried}
+        if not killed:
+            return
+        self.buried |= {self.others.word(name) for name in killed}
+        for info in self.node.get_publishers_info_by_topic(TOPIC):
+            if node_name(info) in killed:
+                announce_end(process_of(info), self.node.context.get_domain_id())
 
     def leave(self) -> str:
         """The last word, as the node ends -> a line on what its results lack, or ""."""

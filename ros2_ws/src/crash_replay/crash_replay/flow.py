@@ -16,10 +16,10 @@ heartbeat Fast DDS searches what a reader holds: at 500 that takes longer than w
 BYTES = 250_000
 """Bytes that may be on their way: half of what Fast DDS holds between processes; what exceeds it is sent again."""
 SAY_AFTER, SAY_AGAIN = 0.8, 30.0
-"""Seconds of waiting after which it is said who for: one that was killed is waited for until its lease ends, 5 s.
+"""Seconds of waiting after which it is said who for.
 Seconds between two such lines: one that is slow is waited for again and again."""
 PATIENCE = 10.0
-"""Seconds to wait for a subscriber that takes nothing; one that was killed is gone before."""
+"""Seconds to wait for a subscriber that takes nothing; one that was killed is forgotten before, see `obituary`."""
 
 
 class Flow:

@@ -9,6 +9,8 @@ from rclpy.publisher import Publisher
 from rclpy.qos import ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from .obituary import announce_end
+
 UNNAMED = "_NODE_NAME_UNKNOWN_"
 """As rcl calls the node of a publisher or subscription that was found before its node was."""
 PROCESSES = Path("/proc")
@@ -31,16 +33,22 @@ def waited_for(node: Node, publishers: Sequence[Publisher]) -> str:
     listening = [e for topic in topics for e in node.get_subscriptions_info_by_topic(topic)]
     gone = sorted({_said(e) for topic in topics for e in killed(node, topic) if _acknowledges(e)})
     if gone:
-        return f"{', '.join(gone)}, which was killed (the middleware forgets it within some seconds)"
+        return f"{', '.join(gone)}, which was killed"
     names = sorted({_said(e) for e in listening if _acknowledges(e)})
     return names[0] if len(names) == 1 else f"one of {', '.join(names) or 'those that have just gone'}"
 
 
 def killed(node: Node, topic: str) -> list[TopicEndpointInfo]:
-    """Subscriptions on a topic of the node's that the middleware has yet to forget: their processes run no more."""
+    """Subscriptions on a topic of the node's that the middleware has yet to forget: their processes run no more.
+
+    It is told so.
+    """
     own = [process_of(e) for e in node.get_publishers_info_by_topic(topic)]
     processes = running()
-    return [e for e in node.get_subscriptions_info_by_topic(topic) if is_gone(process_of(e), own, processes)]
+    gone = [e for e in node.get_subscriptions_info_by_topic(topic) if is_gone(process_of(e), own, processes)]
+    for participant in {process_of(e) for e in gone}:
+        announce_end(participant, node.context.get_domain_id())
+    return gone
 
 
 def _acknowledges(endpoint: TopicEndpointInfo) -> bool:
