@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from crash_replay.conditioning import CFC_CLASSES
+from crash_replay.fault import guarded
 from crash_replay.recording import Recording
+from crash_replay.said import Parser
 
-from ..cli.common import guarded
 from ..core.methods import METHODS
 from ..model_file import ready_models
 from .children import Children
@@ -38,12 +39,11 @@ PATIENCE_OF_REPLAY = 600.0
 
 def main() -> int:
     interrupt_on_signals()  # what was started is ended
-    arguments = _parser().parse_args()
-    return guarded(lambda: demo(arguments))
+    return guarded(lambda: demo(_parser().parse_args()))
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def _parser() -> Parser:
+    parser = Parser(
         prog="demo",
         description="Replay a recording, estimate on it, name what the model lacks, add it, show how the error falls.",
     )

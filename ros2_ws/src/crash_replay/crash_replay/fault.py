@@ -1,0 +1,94 @@
+"""How a program ends: with its exit status, and one line on standard error where something is at fault.
+
+Nothing that is raised, whatever it is, reaches the user as a traceback: CRASH_TRACEBACK=1 in the environment shows it.
+"""
+
+import os
+import sys
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from .foreign_text import visible
+
+DONE, AT_FAULT = 0, 1
+INTERRUPTED, NOBODY_READS = 130, 141
+"""As a shell reports a program that Ctrl-C, or a pipe that nobody reads, has ended."""
+
+TRACEBACK = "CRASH_TRACEBACK"
+LONGEST = 1000
+"""Characters of an error's text that are worth reading."""
+
+
+class Fault(ValueError):
+    """Data, a model, a file or what was asked for is at fault; the message is one readable line."""
+
+
+class NobodyReads(Exception):
+    """What is printed goes into a pipe whose reader has gone, as of `| head`."""
+
+
+class Usage(SystemExit):
+    """The command line is at fault, or `--help` was asked for: all has been said."""
+
+
+def guarded(command: Callable[[], int | None], also: tuple[type[Exception], ...] = ()) -> int:
+    """Run a command -> its exit status: what it says, 0 for nothing, 1 where something is at fault.
+
+    also: exceptions that are no fault of the program either, with a message that can be read.
+    """
+    try:
+        return command() or DONE
+    except Usage:
+        raise
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except NobodyReads:
+        return NOBODY_READS
+    except (Fault, *also) as error:
+        line = str(error)
+    except OSError as error:
+        line = _of_the_system(error)
+    except BaseException as error:  # a user's effect may call sys.exit: that is not how a command ends
+        line = of_the_program(error)
+    complain(line)
+    return AT_FAULT
+
+
+def complain(line: str, word: str = "error") -> None:
+    """One line on standard error; nothing where there is nobody to read it."""
+    with suppress(OSError, ValueError, AttributeError):
+        print(f"{word}: {one_line(line)}", file=sys.stderr, flush=True)
+
+
+def one_line(text: object) -> str:
+    line = visible(" ".join(str(text).split()))
+    return line if len(line) <= LONGEST else f"{line[:LONGEST]} ..."
+
+
+def of_the_program(error: BaseException) -> str:
+    """What failed and where, and how to see more of it."""
+    if os.environ.get(TRACEBACK):
+        traceback.print_exception(error)
+    what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    return f"a fault of the program: {one_line(what)} (at {_where(error)}; {TRACEBACK}=1 shows the traceback)"
+
+
+def _of_the_system(error: OSError) -> str:
+    if error.errno is None:
+        return str(error)  # of ours, in words
+    return f"{error.filename}: {error.strerror}" if error.filename is not None else of_the_program(error)
+
+
+def _where(error: BaseException) -> str:
+    """File and line of the innermost call in this project or in a file of the user's."""
+    calls, step = [], error.__traceback__
+    while step:
+        calls.append((step.tb_frame.f_globals.get("__name__", ""), step.tb_frame.f_code.co_filename, step.tb_lineno))
+        step = step.tb_next
+    ours = [call for call in calls if call[0].startswith(("crash_", "<run_path>", "__main__"))]
+    if not calls:
+        return "an unknown place"
+    _, file, line = (ours or calls)[-1]
+    return f"{'/'.join(Path(file).parts[-2:])}:{line}"
