@@ -18,7 +18,7 @@ INTERRUPTED, NOBODY_READS = 130, 141
 
 TRACEBACK = "CRASH_TRACEBACK"
 LONGEST = 1000
-"""Characters of an error's text that are worth reading."""
+"""Characters of a line that are worth reading; an exception's text may have half of them."""
 
 
 class Fault(ValueError):
@@ -62,9 +62,9 @@ def complain(line: str, word: str = "error") -> None:
         print(f"{word}: {one_line(line)}", file=sys.stderr, flush=True)
 
 
-def one_line(text: object) -> str:
+def one_line(text: object, longest: int = LONGEST) -> str:
     line = visible(" ".join(str(text).split()))
-    return line if len(line) <= LONGEST else f"{line[:LONGEST]} ..."
+    return line if len(line) <= longest else f"{line[:longest]} ..."
 
 
 def of_the_program(error: BaseException) -> str:
@@ -72,7 +72,7 @@ def of_the_program(error: BaseException) -> str:
     if os.environ.get(TRACEBACK):
         traceback.print_exception(error)
     what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-    return f"a fault of the program: {one_line(what)} (at {_where(error)}; {TRACEBACK}=1 shows the traceback)"
+    return f"a fault of the program: {one_line(what, LONGEST // 2)} (at {_where(error)}; {TRACEBACK}=1 shows the traceback)"
 
 
 def _of_the_system(error: OSError) -> str:
@@ -87,7 +87,7 @@ def _where(error: BaseException) -> str:
     while step:
         calls.append((step.tb_frame.f_globals.get("__name__", ""), step.tb_frame.f_code.co_filename, step.tb_lineno))
         step = step.tb_next
-    ours = [call for call in calls if call[0].startswith(("crash_", "<run_path>", "__main__"))]
+    ours = [call for call in calls if call[0].startswith(("crash_", "<run_path>", "__main__")) and call[0] != __name__]
     if not calls:
         return "an unknown place"
     _, file, line = (ours or calls)[-1]

@@ -87,7 +87,7 @@ def demo(arguments: argparse.Namespace) -> int:
     cfc = 0 if searches and arguments.cfc is None else arguments.cfc  # a filter would hide what the sensors' noise is
     with claim(arguments.out, source) as out:
         recording, bag, lines = as_bag(source, out, cfc)
-        others = [as_bag(other, out, cfc)[1] for other in arguments.others]
+        others = [as_bag(other, out / f"with_{k}", cfc)[1] for k, other in enumerate(arguments.others, 1)]
         choices = _choices(arguments, source, recording)
         rate = arguments.rate or default_rate(recording.time[-1] - recording.time[0])
         terminal = Terminal()
