@@ -56,7 +56,7 @@ def test_one_place_prints():
 
 def test_one_place_writes_files():
     """Whole or not at all: by `output`; the others write what is streamed, appended to, or in a scratch folder."""
-    streamed = ("bag_writer.py", "sinks.py", "children.py", "effects_results.py", "scheduling.py")
+    streamed = ("bag_writer.py", "sinks.py", "children.py", "said.py", "effects_results.py", "scheduling.py")
     scratch = ("report_page.py", "speed_recordings.py", "effects_judge.py")
     writing = r"\.write_(text|bytes)\(|open\([^)]*[\"'][wax]b?\+?[\"']"
     assert sources_with(writing, "output.py", *streamed, *scratch) == []

@@ -52,6 +52,10 @@ def test_whatever_is_raised_is_one_line_and_status_1(command, said, capsys):
         assert "CRASH_TRACEBACK=1 shows the traceback" in told.err
 
 
+def test_a_fault_is_one_line_wherever_it_is_said():
+    assert "{}".format(Fault("a:\n  b\x1b[0m")) == r"a: b\x1b[0m" and str(Fault("a  b")) == "a  b"
+
+
 def test_the_traceback_is_shown_where_it_is_asked_for(capsys, monkeypatch):
     monkeypatch.setenv("CRASH_TRACEBACK", "1")
     assert guarded(raising(ZeroDivisionError("oh"))) == 1

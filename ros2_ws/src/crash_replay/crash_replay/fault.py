@@ -17,12 +17,15 @@ INTERRUPTED, NOBODY_READS = 130, 141
 """As a shell reports a program that Ctrl-C, or a pipe that nobody reads, has ended."""
 
 TRACEBACK = "CRASH_TRACEBACK"
-LONGEST = 1000
-"""Characters of a line that are worth reading; an exception's text may have half of them."""
+LONGEST = 500
+"""Characters of an exception's text that are worth reading."""
 
 
 class Fault(ValueError):
-    """Data, a model, a file or what was asked for is at fault; the message is one readable line."""
+    """Data, a model, a file or what was asked for is at fault; the message is one readable line, in a log too."""
+
+    def __str__(self) -> str:
+        return one_line(super().__str__())
 
 
 class NobodyReads(Exception):
@@ -62,17 +65,18 @@ def complain(line: str, word: str = "error") -> None:
         print(f"{word}: {one_line(line)}", file=sys.stderr, flush=True)
 
 
-def one_line(text: object, longest: int = LONGEST) -> str:
-    line = visible(" ".join(str(text).split()))
-    return line if len(line) <= longest else f"{line[:longest]} ..."
+def one_line(text: str) -> str:
+    """Line ends as spaces, and whatever else does not print as it can be seen."""
+    return text if text.isprintable() else visible(" ".join(text.split()))
 
 
 def of_the_program(error: BaseException) -> str:
     """What failed and where, and how to see more of it."""
     if os.environ.get(TRACEBACK):
         traceback.print_exception(error)
-    what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-    return f"a fault of the program: {one_line(what, LONGEST // 2)} (at {_where(error)}; {TRACEBACK}=1 shows the traceback)"
+    what = one_line(f"{type(error).__name__}: {error}" if str(error) else type(error).__name__)
+    what = what if len(what) <= LONGEST else f"{what[:LONGEST]} ..."
+    return f"a fault of the program: {what} (at {_where(error)}; {TRACEBACK}=1 shows the traceback)"
 
 
 def _of_the_system(error: OSError) -> str:
