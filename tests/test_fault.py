@@ -2,9 +2,12 @@
 
 import errno
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -12,6 +15,7 @@ from crash_estimator.cli import diagnose, estimate, report, simulate
 from crash_estimator.demo import command as demo
 from crash_replay import import_command, replay_node, ros_runtime, synthesize_command
 from crash_replay.fault import Fault, NobodyReads, guarded
+from crash_replay.output import written
 
 BAGS = Path(__file__).parents[1] / "bags"
 
@@ -69,6 +73,30 @@ def test_other_ends(capsys):
     assert guarded(raising(NobodyReads())) == 141
     assert guarded(raising(LookupError("its own")), also=(LookupError,)) == 1
     assert capsys.readouterr().err == "error: its own\n"
+
+
+def test_what_ends_a_thread_is_a_line_and_status_1(capsys):
+    def command():
+        thread = Thread(target=raising(ZeroDivisionError("in a thread")))
+        thread.start()
+        thread.join()
+
+    assert guarded(command) == 1
+    told = capsys.readouterr().err
+    assert told.startswith("error: a fault of the program: ZeroDivisionError: in a thread") and told.count("\n") == 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_leaves_nothing_half_written(number, tmp_path, capsys):
+    def command():
+        with written(tmp_path / "a.txt") as file:
+            file.write_text("half of")
+            os.kill(os.getpid(), number)
+            time.sleep(5.0)
+
+    assert guarded(command) == 128 + number
+    assert list(tmp_path.iterdir()) == [] and signal.getsignal(number) is signal.SIG_DFL
+    assert capsys.readouterr().err == ""
 
 
 OF_A_BAG = ["impactor_single.mcap", "--model", "impactor_single"]

@@ -17,6 +17,7 @@ from crash_estimator.demo.choice import Choice
 from crash_estimator.demo.command import _announcement
 from crash_estimator.demo.terminal import Terminal
 from crash_estimator.model_file import load_model
+from crash_estimator.viewer.summary import row
 from crash_replay import import_command
 from crash_replay.bag import read_bag
 from crash_replay.foreign_text import code, code_block, markdown, visible, visible_lines
@@ -152,6 +153,10 @@ def test_a_demonstration_announces_it_on_lines_of_its_own(hostile, capsys):
         Terminal().say(line)
     said = capsys.readouterr().out.split("\n")
     assert len(said) == 5 and all(line.isprintable() for line in said)
+
+
+def test_the_viewer_s_tables_hold_no_markup_but_their_own():
+    assert row("a|b", ["<b>", "rib_ay"]) == r"| a\|b | &lt;b&gt; | rib_ay |"
 
 
 @pytest.mark.parametrize("command", [estimate, diagnose, simulate])

@@ -102,6 +102,34 @@ class TestWriting:
             check_outputs({"--json": tmp_path / "x", "--apply": tmp_path / "a" / ".." / "x"}, [])
 
 
+def test_the_viewer_replaces_its_own_recordings_only(tmp_path):
+    pytest.importorskip("rerun")
+    from crash_estimator.viewer.sinks import Sinks
+
+    shutil.copy(BAGS / "impactor_single.mcap", tmp_path / "test.mcap")
+    (tmp_path / "link").symlink_to("test.mcap")
+    before = (tmp_path / "test.mcap").read_bytes()
+    for name in ("test.mcap", "link"):
+        with pytest.raises(OutputError, match=f"{name} is no Rerun recording and is not replaced"):
+            Sinks(port=0, rrd=tmp_path / name).open_file()
+    assert (tmp_path / "test.mcap").read_bytes() == before
+    (tmp_path / "old.rrd").write_bytes(b"RRF2 of another run")
+    _, file = Sinks(port=0, rrd=tmp_path / "old.rrd").open_file()
+    assert file == tmp_path / "old.rrd"
+
+
+def test_a_demonstration_writes_into_no_recording(tmp_path):
+    from crash_estimator.demo.folder import claim
+
+    (tmp_path / "nhtsa").mkdir()
+    with claim(tmp_path, tmp_path / "nhtsa") as folder:
+        assert folder == tmp_path / "nhtsa-2"
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="file/test: cannot be written: Not a directory"):
+        with claim(tmp_path / "file", Path("test.mcap")):
+            pass
+
+
 @pytest.fixture
 def inputs(tmp_path):
     """One of everything that a command may read, with links of both kinds to the bag."""

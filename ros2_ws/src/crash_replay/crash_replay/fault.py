@@ -4,17 +4,20 @@ Nothing that is raised, whatever it is, reaches the user as a traceback: CRASH_T
 """
 
 import os
+import signal
 import sys
+import threading
 import traceback
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .foreign_text import visible
 
 DONE, AT_FAULT = 0, 1
-INTERRUPTED, NOBODY_READS = 130, 141
-"""As a shell reports a program that Ctrl-C, or a pipe that nobody reads, has ended."""
+INTERRUPTED, NOBODY_READS = 128 + signal.SIGINT, 128 + signal.SIGPIPE
+"""As a shell reports a program that a signal has ended."""
+ENDING = (signal.SIGTERM, signal.SIGHUP)
 
 TRACEBACK = "CRASH_TRACEBACK"
 LONGEST = 500
@@ -32,6 +35,10 @@ class NobodyReads(Exception):
     """What is printed goes into a pipe whose reader has gone, as of `| head`."""
 
 
+class Ended(BaseException):
+    """By a signal: what was begun is cleared away."""
+
+
 class Usage(SystemExit):
     """The command line is at fault, or `--help` was asked for: all has been said."""
 
@@ -42,9 +49,12 @@ def guarded(command: Callable[[], int | None], also: tuple[type[Exception], ...]
     also: exceptions that are no fault of the program either, with a message that can be read.
     """
     try:
-        return command() or DONE
+        with _signals_end_it(), _threads_complain() as failed:
+            return command() or (AT_FAULT if failed else DONE)
     except Usage:
         raise
+    except Ended as ended:
+        return 128 + ended.args[0]
     except KeyboardInterrupt:
         return INTERRUPTED
     except NobodyReads:
@@ -57,6 +67,40 @@ def guarded(command: Callable[[], int | None], also: tuple[type[Exception], ...]
         line = of_the_program(error)
     complain(line)
     return AT_FAULT
+
+
+@contextmanager
+def _signals_end_it() -> Iterator[None]:
+    """Like Ctrl-C, unless they are dealt with already: a file that is half written would stay."""
+    ours = threading.current_thread() is threading.main_thread()
+    default = [number for number in ENDING if ours and signal.getsignal(number) is signal.SIG_DFL]
+
+    def end(number: int, _) -> None:
+        raise Ended(number)
+
+    for number in default:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in default:
+            signal.signal(number, signal.SIG_DFL)
+
+
+@contextmanager
+def _threads_complain() -> Iterator[list[BaseException]]:
+    """What ends a thread is said in a line too, and remembered."""
+    failed: list[BaseException] = []
+
+    def remember(of: threading.ExceptHookArgs) -> None:
+        failed.append(of.exc_value)
+        complain(of_the_program(of.exc_value))
+
+    before, threading.excepthook = threading.excepthook, remember
+    try:
+        yield failed
+    finally:
+        threading.excepthook = before
 
 
 def complain(line: str, word: str = "error") -> None:
