@@ -49,7 +49,7 @@ def sources_with(pattern: str, *but: str) -> list[str]:
 
 
 def test_one_place_prints():
-    """What is printed goes through `say` or `complain`, which show foreign text and tell of a full disk."""
+    """What is printed goes through `say` or `tell`, which show foreign text and tell of a full disk."""
     elsewhere = ("record_node.py", "speed.py")  # the benchmark's progress: its own words, on standard error
     assert sources_with(r"(?<![\w.])print\(", "said.py", "fault.py", *elsewhere) == []
 

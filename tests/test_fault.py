@@ -39,8 +39,8 @@ def endless():
         (raising(FileNotFoundError(errno.ENOENT, "No such file or directory", "a.csv")),
          "error: a.csv: No such file or directory"),
         (raising(OSError("no free port")), "error: no free port"),
-        (raising(OSError(errno.EBADF, "Bad file descriptor")), "error: a fault of the program: OSError: [Errno 9] Bad file"),
-        (raising(ZeroDivisionError("division by\nzero")), "error: a fault of the program: ZeroDivisionError: division by z"),
+        (raising(OSError(errno.EBADF, "Bad file")), "error: a fault of the program: OSError: [Errno 9] Bad file"),
+        (raising(ZeroDivisionError("division\nby")), "error: a fault of the program: ZeroDivisionError: division by"),
         (raising(MemoryError()), "error: a fault of the program: MemoryError (at tests/test_fault.py:"),
         (raising(SystemExit(0)), "error: a fault of the program: SystemExit: 0"),
         (raising(BrokenPipeError(errno.EPIPE, "Broken pipe")), "error: a fault of the program: BrokenPipeError"),
@@ -64,7 +64,9 @@ def test_the_traceback_is_shown_where_it_is_asked_for(capsys, monkeypatch):
     monkeypatch.setenv("CRASH_TRACEBACK", "1")
     assert guarded(raising(ZeroDivisionError("oh"))) == 1
     told = capsys.readouterr().err.splitlines()
-    assert told[0].startswith("Traceback") and told[-1].startswith("error: a fault of the program: ZeroDivisionError: oh")
+    assert told[0].startswith("Traceback") and told[-1].startswith(
+        "error: a fault of the program: ZeroDivisionError: oh"
+    )
 
 
 def test_other_ends(capsys):

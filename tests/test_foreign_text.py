@@ -45,8 +45,8 @@ def test_a_page_shows_it_as_it_is_written():
 def raw(recording: Recording) -> SimpleNamespace:
     """The recording with a hostile text in every field: what another program may have written."""
     test = recording.test
-    channels = [SimpleNamespace(name=c.name, quantity=c.quantity, unit=c.unit, body=HOSTILE, axis=c.axis, source=HOSTILE)
-                for c in test.channels]  # fmt: skip
+    known = [dict(name=c.name, quantity=c.quantity, unit=c.unit, axis=c.axis) for c in test.channels]
+    channels = [SimpleNamespace(**one, body=HOSTILE, source=HOSTILE) for one in known]
     channels.append(SimpleNamespace(**vars(channels[0]) | {"name": HOSTILE}))
     velocity = dict(test.initial_velocity) | {HOSTILE: 1.0}
     hostile = SimpleNamespace(id=HOSTILE, title=HOSTILE, source=HOSTILE, channels=channels, notes=[HOSTILE, HOSTILE],
@@ -86,7 +86,8 @@ def hostile(tmp_path_factory):
     quoted = '"' + HOSTILE.encode("unicode_escape").decode() + '"'
     (folder / "test.yaml").write_text(
         f"test: {{id: {quoted}, title: {quoted}, source: {quoted}}}\n"
-        f"channels: {{car_ax: {{quantity: acceleration, unit: g, body: {quoted}}}}}\ninitial_velocity: {{{quoted}: 1.0}}\n"
+        f"channels: {{car_ax: {{quantity: acceleration, unit: g, body: {quoted}}}}}\n"
+        f"initial_velocity: {{{quoted}: 1.0}}\n"
     )
     return folder
 
@@ -128,7 +129,9 @@ def test_no_command_prints_it_raw(hostile, monkeypatch, capsys, tmp_path, comman
 
 def test_an_import_prints_and_keeps_it_so_that_it_can_be_printed(hostile, monkeypatch, capsys, tmp_path):
     for source in ("bag", "test.csv"):
-        status, out, err = run(monkeypatch, capsys, import_command, hostile / source, "--to", tmp_path / f"{source}.mcap")
+        status, out, err = run(
+            monkeypatch, capsys, import_command, hostile / source, "--to", tmp_path / f"{source}.mcap"
+        )
         assert status == 0 and r"\x1b[31m" in out, err
         assert read_bag(tmp_path / f"{source}.mcap").test.title.isprintable()
 

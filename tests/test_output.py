@@ -15,7 +15,10 @@ from crash_replay import import_command, output
 from crash_replay.output import OutputError, check_outputs, write_text, written, written_into
 
 BAGS = Path(__file__).parents[1] / "bags"
-OWN = 'from crash_estimator.core.effects.base import ElementForce\nEFFECT = ElementForce("own", "N", force=lambda m: m.rate)'
+OWN = """
+from crash_estimator.core.effects.base import ElementForce
+EFFECT = ElementForce("own", "N", force=lambda motion: motion.rate)
+"""
 CSV = "channels:\n  car_ax: {quantity: acceleration, unit: g, body: car, axis: x}\n"
 
 
@@ -149,6 +152,7 @@ def inputs(tmp_path):
 
 
 ON_A_BAG = ["test.mcap", "symbolic", "hard", "model.yaml", "own.py"]
+OF_A_CSV = ["test.csv", "test.yaml", "names.yaml"]
 COMMON = ["{}/test.mcap", "--model", "{}/model.yaml", "--effects", "{}/own.py"]
 IN_A_FOLDER = ["{}/bag", "--model", "{}/model.yaml"]
 IMPORT = ["{}/test.csv", "--names", "{}/names.yaml", "--force"]
@@ -160,8 +164,8 @@ WRITING = [
     (simulate, [*COMMON, "--from", "{}/bag/bag_0.mcap"], "--json", "bag/bag_0.mcap"),
     (diagnose, ["{}/bag", *COMMON], "--json", "test.mcap"),
     (report, IN_A_FOLDER, "--to", "bag"),
-    *((import_command, IMPORT, "--to", file) for file in ("test.csv", "test.yaml", "names.yaml")),
-    *((import_command, [*IMPORT, "--to", "{}/../b.mcap"], "--json", f) for f in ("test.csv", "test.yaml", "names.yaml")),
+    *((import_command, IMPORT, "--to", file) for file in OF_A_CSV),
+    *((import_command, [*IMPORT, "--to", "{}/../b.mcap"], "--json", file) for file in OF_A_CSV),
     (import_command, ["{}/test.mcap", "--force"], "--to", "hard"),
     (import_command, ["{}/bag", "--force"], "--to", "bag"),
 ]  # fmt: skip
@@ -226,9 +230,14 @@ def test_a_limit_on_the_size_of_files_is_told(inputs, tmp_path):
     """As the system itself does it, in a process of its own."""
     (tmp_path / "out.json").write_text("older")
     done = of_its_own(
-        inputs, "--json", tmp_path / "out.json", preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (999, 999))
+        inputs,
+        "--json",
+        tmp_path / "out.json",
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (999, 999)),
     )
-    assert done.returncode == 1 and done.stderr == f"error: {tmp_path / 'out.json'}: cannot be written: File too large\n"
+    assert (
+        done.returncode == 1 and done.stderr == f"error: {tmp_path / 'out.json'}: cannot be written: File too large\n"
+    )
     assert (tmp_path / "out.json").read_text() == "older" and names(tmp_path) - names(inputs.parent) == set()
 
 

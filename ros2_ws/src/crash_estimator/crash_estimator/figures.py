@@ -65,12 +65,24 @@ def _panel(axes, panel: Panel) -> None:
     for value, label in panel.levels:
         axes.axhline(value, color=GREY, linewidth=0.7, linestyle="--")
         axes.annotate(
-            _plain(label), (1.0, value), xycoords=("axes fraction", "data"), fontsize=6, color=GREY, ha="right", va="bottom"
+            _plain(label),
+            (1.0, value),
+            xycoords=("axes fraction", "data"),
+            fontsize=6,
+            color=GREY,
+            ha="right",
+            va="bottom",
         )
     for value, label in panel.marks:
         axes.axvline(value, color=GREY, linewidth=0.7, linestyle=":")
         axes.annotate(
-            _plain(label), (value, 0.98), xycoords=("data", "axes fraction"), fontsize=6, color=GREY, rotation=90, va="top"
+            _plain(label),
+            (value, 0.98),
+            xycoords=("data", "axes fraction"),
+            fontsize=6,
+            color=GREY,
+            rotation=90,
+            va="top",
         )
     axes.set_title(_plain(panel.title), fontsize=9, loc="left")
     axes.set_xlabel(panel.x_label, fontsize=8)

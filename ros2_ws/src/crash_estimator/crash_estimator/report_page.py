@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crash_replay.foreign_text import code, code_block, markdown
+from crash_replay.foreign_text import code, code_block, markdown, markdown_cells
 from crash_replay.output import written_into
 from crash_replay.recording import Recording, RecordingError
 
@@ -135,7 +135,7 @@ def _variances(results: dict[str, Result]) -> str:
         )
         rows.append((f"output {name}", *(_mean_variance(e.output_mean, e.output_variance, factor) for e in errors)))
         rows.append((f"error {name}", *(_mean_variance(e.error_mean, e.error_variance, factor) for e in errors)))
-    return markdown_table(("mean, variance", *results), _shown(rows))
+    return markdown_table(("mean, variance", *results), markdown_cells(rows))
 
 
 def _mean_variance(mean: float, variance: float, factor: float) -> str:
@@ -148,11 +148,7 @@ def _cross(results: dict[str, Result]) -> str:
         for equation in result.validation.equations:
             values = [f"{name} {c.values[len(c.values) // 2]:+.2f}" for name, c in equation.cross.items()]
             rows.append((f"{equation.equation}, {method}", ", ".join(values)))
-    return markdown_table(("error of", "with"), _shown(rows))
-
-
-def _shown(rows: Sequence[Sequence[str]]) -> list[list[str]]:
-    return [[markdown(cell) for cell in row] for row in rows]
+    return markdown_table(("error of", "with"), markdown_cells(rows))
 
 
 def _equations(results: dict[str, Result]) -> list[tuple[str, str]]:
@@ -182,12 +178,8 @@ def _figures(structure: Structure, results: dict[str, Result], folder: Path) -> 
     page += ["![characteristics](characteristics.png)", ""]
     if correlations:
         draw(folder / "correlations.png", correlations, columns=3, height=2.2)
-        page += [
-            "## Correlation of the error (figures 5.13 to 5.15, 5.19 to 5.21)",
-            "",
-            "![correlations](correlations.png)",
-            "",
-        ]
+        page += ["## Correlation of the error (figures 5.13 to 5.15, 5.19 to 5.21)", ""]
+        page += ["![correlations](correlations.png)", ""]
     return page
 
 
@@ -291,8 +283,8 @@ def _masses(recording: Recording, structure: Structure, folder: Path, end: float
     lines = [Line(time, _column(estimates, "parameters", k), n, spread=sigma(k)) for k, n in enumerate(names)]
     top = 2.0 * float(last.parameters.sum())
     draw(folder / "masses.png", [Panel("effective masses", "time in ms", "kg", lines, y_range=(0.0, top))], columns=1)
-    found = ", ".join(f"{name} {m:.0f} +- {s:.0f} kg" for name, m, s in zip(names, last.parameters, last.std))
-    page = ["## Effective masses (figures 4.12, 4.26)", "", f"{markdown(found)}; together {last.parameters.sum():.0f} kg.", ""]
+    found = markdown(", ".join(f"{name} {m:.0f} +- {s:.0f} kg" for name, m, s in zip(names, last.parameters, last.std)))
+    page = ["## Effective masses (figures 4.12, 4.26)", "", f"{found}; together {last.parameters.sum():.0f} kg.", ""]
     return [*page, "![masses](masses.png)", ""]
 
 

@@ -37,8 +37,8 @@ def time_zero_ns(recording: Recording) -> int:
 def write_bag(recording: Recording, path: str | Path, overwrite: bool = False) -> Path:
     """Write a rosbag2 folder, or a single file where `path` ends in .mcap. Only a complete bag appears there.
 
-    Raises OutputError where it cannot be written, RecordingError where the name is taken (with `overwrite`: by something that is not a bag),
-    and where a channel's name or axis does not fit into a ROS topic.
+    Raises OutputError where it cannot be written, RecordingError where the name is taken (with `overwrite`: by
+    something that is not a bag), and where a channel's name or axis does not fit into a ROS topic.
     """
     path = Path(path)
     _check_channels(recording.test)

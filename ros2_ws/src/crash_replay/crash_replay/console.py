@@ -13,7 +13,7 @@ from .foreign_text import visible, visible_lines
 from .keyboard import Keyboard
 from .keys import HELP, next_rate
 from .pacing import Pacing
-from .player import SECOND, CommandError, Mode, Player
+from .player import SECOND, CommandError, Player
 
 PERIOD = 0.1
 """Seconds between two drawings of the progress line."""

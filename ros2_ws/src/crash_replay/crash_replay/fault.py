@@ -103,10 +103,15 @@ def _threads_complain() -> Iterator[list[BaseException]]:
         threading.excepthook = before
 
 
-def complain(line: str, word: str = "error") -> None:
+def complain(line: str) -> None:
+    """What is at fault."""
+    tell(f"error: {line}")
+
+
+def tell(line: str) -> None:
     """One line on standard error; nothing where there is nobody to read it."""
     with suppress(OSError, ValueError, AttributeError):
-        print(f"{word}: {one_line(line)}", file=sys.stderr, flush=True)
+        print(one_line(line), file=sys.stderr, flush=True)
 
 
 def one_line(text: str) -> str:

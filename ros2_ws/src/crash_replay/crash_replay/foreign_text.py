@@ -1,12 +1,13 @@
 """Text that comes from outside - a recording's, a model's, another node's, a path - is shown, never obeyed.
 
 A terminal obeys control characters, a page obeys its markup. Where text enters (`Test`, `Channel`, `load_yaml`, a
-message) and where it is printed (`said.say`, `fault.complain`) it goes through `visible`; in a Markdown page through
+message) and where it is printed (`said.say`, `fault.tell`) it goes through `visible`; in a Markdown page through
 `markdown`, or through `code` where it stands as it is.
 """
 
 import re
 import unicodedata
+from collections.abc import Sequence
 
 MARKUP = re.compile(r"[\\`*\[\]|~$#]|(?<!\w)_|_(?!\w)")
 """What Markdown obeys, beside HTML; an underscore within a name is a letter like any other."""
@@ -40,6 +41,11 @@ def markdown(text: object) -> str:
     return MARKUP.sub(lambda found: "\\" + found[0], plain)
 
 
+def markdown_cells(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """The same of a table's rows."""
+    return [[markdown(cell) for cell in row] for row in rows]
+
+
 def code(text: object) -> str:
     """In a Markdown page, within a line, in the letters of code."""
     return f"`{_within_code(visible(text))}`"
@@ -51,5 +57,5 @@ def code_block(text: object) -> str:
 
 
 def _within_code(text: str) -> str:
-    """Nothing escapes a backtick there, nor a tag where a reader takes the page for HTML: others that look like them."""
+    """Nothing escapes a backtick there, nor a tag where a reader takes the page for HTML: others that look alike."""
     return TAG.sub("‹", text.replace("`", "'"))

@@ -60,9 +60,7 @@ def import_recording(given: argparse.Namespace) -> Recording:
 
 def _parser() -> argparse.ArgumentParser:
     forms = "; ".join(reader.expects for reader in READERS)
-    parser = Parser(
-        prog="import", description=f"Make a bag of a recording. SOURCE is one of: {forms}."
-    )
+    parser = Parser(prog="import", description=f"Make a bag of a recording. SOURCE is one of: {forms}.")
     parser.add_argument("source", type=Path, metavar="SOURCE")
     parser.add_argument(
         "--to", type=Path, required=True, metavar="BAG", help="rosbag2 folder, or one file if it ends in .mcap"

@@ -114,7 +114,9 @@ def _check_not_read(option: str, path: Path, inputs: Iterable[Path]) -> None:
         if any(_same(path, file) for file in _read_with(given)):
             raise OutputError(f"{option} {visible(path)} is what this command reads: give another name")
         if given.is_dir() and _same(path.parent, given):
-            raise OutputError(f"{option} {visible(path)} lies in {visible(given)}, which this command reads: write elsewhere")
+            raise OutputError(
+                f"{option} {visible(path)} lies in {visible(given)}, which this command reads: write elsewhere"
+            )
 
 
 def _read_with(path: Path) -> list[Path]:

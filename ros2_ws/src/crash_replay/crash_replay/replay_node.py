@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger
 
 from .bag import read_bag
 from .console import Console, wanted
-from .fault import complain, guarded
+from .fault import guarded, tell
 from .pacing import Outcome, Pacing
 from .player import SECOND, CommandError, Player
 from .replay_parameters import LIVE, ParameterError, checked, declare_parameters, names_in, window_of
@@ -152,7 +152,7 @@ def _main() -> int:
         outcome = node.replay()
         say(outcome.text)
         for line in outcome.lacking:
-            complain(line, "incomplete")
+            tell(f"incomplete: {line}")
         return 1 if outcome.lacking else 0
     finally:
         node.topics.audience.leave()

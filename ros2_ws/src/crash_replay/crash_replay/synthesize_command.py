@@ -28,9 +28,7 @@ def main() -> int:
 
 
 def command() -> None:
-    parser = Parser(
-        prog="synthesize", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = Parser(prog="synthesize", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument(
         "scenario", nargs="?", metavar="SCENARIO", choices=[*BUILDERS, *STRUCTURES],

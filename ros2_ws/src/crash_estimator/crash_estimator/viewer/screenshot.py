@@ -36,7 +36,7 @@ def screenshot(
 ) -> None:
     """Draw a recording as the viewer would show it, the time cursor at `at` s since the impact (None: at the end).
 
-    Raises ScreenshotError where no viewer can run; what it needs is in LIBRARIES. OutputError: no picture can be written.
+    Raises ScreenshotError where no viewer can run; what it needs is in LIBRARIES. OutputError: it cannot be written.
     """
     rrd, png = Path(rrd).resolve(), Path(png).absolute()
     if not rrd.is_file():
