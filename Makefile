@@ -22,12 +22,12 @@ bags: # the simulated recordings in bags/, made anew
 thesis: # the thesis's simulated experiments run again: docs/thesis.md
 	@tools/env python -m crash_estimator.thesis
 
-benchmark: # every promised speed beside its reference, 8 minutes: docs/benchmark.md; ARGS="--quick"
+benchmark: # every promised speed beside its reference, 8 minutes: docs/benchmark.md; ARGS="--quick" writes out/benchmark.md
 	@tools/setup
 	@.venv/bin/pip install -q --no-deps --no-build-isolation -r tools/benchmark-requirements.txt || true
 	@tools/env python -m crash_estimator.benchmarks.speed $(ARGS)
 
-benchmark-effects: # which hidden effects are found, on 1500 simulated tests: docs/missing-effects.md; ARGS="--cases 20"
+benchmark-effects: # which hidden effects are found, on 1500 simulated tests: docs/missing-effects.md; ARGS="--cases 20" writes out/missing-effects.md
 	@tools/env python -m crash_estimator.benchmarks.effects $(ARGS)
 
 clean: # removes what the set-up installed and built, and what the programs wrote

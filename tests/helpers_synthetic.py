@@ -37,7 +37,6 @@ def synthesize(monkeypatch, *arguments: str) -> int:
     """The command's exit status."""
     monkeypatch.setattr("sys.argv", ["synthesize", *arguments])
     try:
-        main()
-    except SystemExit as ended:
+        return main()
+    except SystemExit as ended:  # usage
         return ended.code
-    return 0

@@ -1,7 +1,14 @@
-"""Imports run one way: the core knows neither ROS nor the viewer, and the replay does not know the estimator."""
+"""Imports run one way: the core knows neither ROS nor the viewer, and the replay does not know the estimator.
 
+And what has one place in the packages is nowhere else.
+"""
+
+import re
 import subprocess
 import sys
+from pathlib import Path
+
+PACKAGES = Path(__file__).parents[1] / "ros2_ws" / "src"
 
 
 def modules_after(statement: str) -> set[str]:
@@ -32,3 +39,31 @@ def test_recordings_bags_and_the_player_work_without_ros():
         "import crash_replay.bag, crash_replay.readers, crash_replay.player\nimport crash_replay.conditioning"
     )
     assert not loaded & {"rclpy", "rerun", "crash_estimator"}
+
+
+def sources_with(pattern: str, *but: str) -> list[str]:
+    """Places in the packages where the pattern stands, outside these files."""
+    files = [file for file in PACKAGES.rglob("*.py") if file.name not in but]
+    lines = ((file, n, line) for file in files for n, line in enumerate(file.read_text().splitlines(), 1))
+    return [f"{file.relative_to(PACKAGES)}:{n}" for file, n, line in lines if re.search(pattern, line)]
+
+
+def test_one_place_prints():
+    """What is printed goes through `say` or `tell`, which show foreign text and tell of a full disk."""
+    elsewhere = ("record_node.py", "speed.py")  # the benchmark's progress: its own words, on standard error
+    assert sources_with(r"(?<![\w.])print\(", "said.py", "fault.py", *elsewhere) == []
+
+
+def test_one_place_writes_files():
+    """Whole or not at all: by `output`; the others write what is streamed, appended to, or in a scratch folder."""
+    streamed = ("bag_writer.py", "sinks.py", "children.py", "said.py", "effects_results.py", "scheduling.py")
+    scratch = ("report_page.py", "speed_recordings.py", "effects_judge.py")
+    writing = r"\.write_(text|bytes)\(|open\([^)]*[\"'][wax]b?\+?[\"']"
+    assert sources_with(writing, "output.py", *streamed, *scratch) == []
+
+
+def test_every_main_is_guarded():
+    unguarded = ("warm_up.py", "diagnosis_worker.py", "speed_relay.py", "record_node.py")  # started by others of ours
+    mains = [file for file in PACKAGES.rglob("*.py") if file.name not in unguarded and "def main(" in file.read_text()]
+    assert len(mains) > 10
+    assert [file.name for file in mains if not re.search(r"guarded\(|return run\(", file.read_text())] == []

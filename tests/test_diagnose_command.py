@@ -39,23 +39,6 @@ def bags(folder):
     return folder / "slow.mcap", folder / "fast.mcap"
 
 
-def test_what_was_found_is_written_though_nobody_reads_on(monkeypatch, folder, tmp_path):
-    """As with `| head -1`."""
-
-    def closed(*_, **__):
-        raise BrokenPipeError
-
-    monkeypatch.setattr("builtins.print", closed)
-    written = tmp_path / "found.json", tmp_path / "new.yaml"
-    monkeypatch.setattr(
-        sys, "argv", ["diagnose", str(bags(folder)[0]), "--model", str(folder / "model.yaml"),
-                      "--json", str(written[0]), "--apply", str(written[1])],
-    )  # fmt: skip
-    with pytest.raises((SystemExit, BrokenPipeError)):
-        diagnose.main()
-    assert all(path.is_file() for path in written)
-
-
 def test_it_says_what_is_missing_and_where_the_model_fails(monkeypatch, capsys, folder):
     out, new = folder / "found.json", folder / "new.yaml"
     model = folder / "model.yaml"

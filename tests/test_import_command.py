@@ -95,19 +95,20 @@ def test_recover(source, tmp_path, capsys):
 @pytest.mark.parametrize(
     "more, said",
     [
-        (["--to", "{}/s.csv"], "s.csv exists already"),
-        (["--to", "{}/s.csv", "--force"], "s.csv is not a bag of this form and is not replaced"),
+        (["--to", "{}/there.csv"], "there.csv exists already"),
+        (["--to", "{}/there.csv", "--force"], "there.csv is not a bag of this form and is not replaced"),
         (["--to", "{}/b", "--channels", "door*"], "no channel matches 'door*'; channels: car_ax, barrier_fx"),
         (["--to", "{}/b", "--names", "{}/no.yaml"], "no.yaml: cannot be read as a YAML text file"),
         (["--to", "{}/b", "--cells"], "takes no option 'cells'"),
-        (["--to", "{}/s.csv/b"], "s.csv/b: cannot be written: "),
+        (["--to", "{}/s.csv/b"], "s.csv cannot be a folder: it is a file"),
     ],
 )
 def test_data_at_fault_is_one_line_and_status_1(source, tmp_path, capsys, more, said):
+    (tmp_path / "there.csv").touch()
     assert run(source, *(argument.format(tmp_path) for argument in more)) == 1
     error = capsys.readouterr().err
-    assert error.startswith("import: ") and said in error and error.count("\n") == 1
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["s.csv", "s.yaml"]
+    assert error.startswith("error: ") and said in error and error.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["s.csv", "s.yaml", "there.csv"]
 
 
 def test_usage_is_status_2(source):

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from crash_replay.foreign_text import code, code_block, markdown, markdown_cells
+from crash_replay.output import written_into
 from crash_replay.recording import Recording, RecordingError
 
 from .core.characteristic import characteristics
@@ -22,7 +24,7 @@ from .core.structure import ModelError, Structure
 from .core.validation import LEVELS, Validation, validate
 from .diagnosis_doubt import doubt
 from .diagnosis_tables import diagnosis_tables
-from .figures import Line, Panel, draw, markdown_table, write_markdown
+from .figures import Line, Panel, draw, markdown_table, wrapped
 from .tables import READABLE, error_table, parameter_table
 from .validation_tables import comparison_table, covariance_table, whiteness_table
 
@@ -45,23 +47,26 @@ def write_report(
     compared: str = "unfiltered",
     settings: Mapping[str, float] = {},
     effects: Mapping[str, Effect] = EFFECTS,
-) -> Path:
-    """Write `report.md` and its figures into the folder -> the page. The settings go to the methods that have them."""
+) -> tuple[Path, int]:
+    """Write `report.md` and its figures into the folder -> the page, how many figures. The settings go to the methods
+    that have them. Names and notes come from a recording and a model, and are written so that a page shows them."""
     if not ((recording.time > 0.0) & (recording.time <= end)).any():
         raise ModelError(f"test {recording.test.id} has no samples between the impact and {end:g} s")
-    folder.mkdir(parents=True, exist_ok=True)
-    page = [f"# {recording.test.title or recording.test.id}", "", *_test(recording, structure, end), ""]
+    page = [f"# {markdown(recording.test.title or recording.test.id)}", "", *_test(recording, structure, end), ""]
     page += _missing(recording, structure, end, effects)
     estimated = partial(_estimated, recording, structure, end=end, effects=effects)
     structure = applied(structure, recording.test, effects)
     results = {method: estimated(method, settings=settings) for method in methods}
     page += _tables(results)
-    page += _figures(structure, results, folder)
     best = methods[-1]
-    page += _free_run(structure, results[best], best, folder, end, smooth, compared)
-    page += _jumps(estimated("afmm", settings={}), folder)
-    page += _masses(recording, structure, folder, end)
-    return write_markdown(folder / "report.md", page)
+    with written_into(folder) as place:
+        page += _figures(structure, results, place)
+        page += _free_run(structure, results[best], best, place, end, smooth, compared)
+        page += _jumps(estimated("afmm", settings={}), place)
+        page += _masses(recording, structure, place, end)
+        figures = len(list(place.iterdir()))
+        (place / "report.md").write_text(wrapped(page), encoding="utf-8")
+    return folder / "report.md", figures
 
 
 def _estimated(
@@ -77,16 +82,17 @@ def _estimated(
 def _test(recording: Recording, structure: Structure, end: float) -> list[str]:
     test = recording.test
     until = min(end, float(recording.time[-1]))
+    bodies = [structure.bodies[k].name for k in structure.equations]
+    elements = ", ".join(f"{e.name} ({e.between[0]}-{e.between[1]})" for e in structure.elements)
     lines = [
-        f"- test `{test.id}`, {len(recording)} samples every {recording.sample_period * 1e3:g} ms, "
+        f"- test {code(test.id)}, {len(recording)} samples every {recording.sample_period * 1e3:g} ms, "
         f"judged up to {until * 1e3:.0f} ms",
-        f"- model `{structure.name}`: equations of {', '.join(structure.bodies[k].name for k in structure.equations)}; "
-        f"elements {', '.join(f'{e.name} ({e.between[0]}-{e.between[1]})' for e in structure.elements)}",
+        f"- model {code(structure.name)}: equations of {markdown(', '.join(bodies))}; elements {markdown(elements)}",
     ]
     known = [f"{spec.type} on {spec.target}" for spec in structure.effects]
-    lines += [f"- effects of the model: {', '.join(known)}"] if known else []
-    lines += [f"- source: {test.source}"] if test.source else []
-    return lines + [f"- {note}" for note in test.notes]
+    lines += [f"- effects of the model: {markdown(', '.join(known))}"] if known else []
+    lines += [f"- source: {markdown(test.source)}"] if test.source else []
+    return lines + [f"- {markdown(note)}" for note in test.notes]
 
 
 def _missing(recording: Recording, structure: Structure, end: float, effects: Mapping[str, Effect]) -> list[str]:
@@ -96,16 +102,16 @@ def _missing(recording: Recording, structure: Structure, end: float, effects: Ma
     try:
         found = diagnose(structure, [judged], effects)
     except (ModelError, RecordingError) as error:
-        return ["## What is missing", "", f"Not searched: {error}.", ""]
-    said = "".join(f"{text[0].upper()}{text[1:]}. " for text in (found.text, doubt(found)) if text)
+        return ["## What is missing", "", f"Not searched: {markdown(error)}.", ""]
+    said = "".join(f"{markdown(text[0].upper() + text[1:])}. " for text in (found.text, doubt(found)) if text)
     said += "Errors here are of the best fit with one curve for each element over the whole record."
-    return ["## What is missing", "", said, "", _code(diagnosis_tables(found)), ""]
+    return ["## What is missing", "", said, "", code_block(diagnosis_tables(found)), ""]
 
 
 def _tables(results: dict[str, Result]) -> list[str]:
     page = ["## Parameters", ""]
     for method, result in results.items():
-        page += [f"`{method}`", "", _code(parameter_table(result.description, result.estimates)), ""]
+        page += [f"`{method}`", "", code_block(parameter_table(result.description, result.estimates)), ""]
     page += ["## Mean and variance of error, input and output (thesis tables 5.1 and 5.2)", "", _variances(results), ""]
     page += ["## The error (tables 5.4 and 6.1)", ""]
     for method, result in results.items():
@@ -114,7 +120,7 @@ def _tables(results: dict[str, Result]) -> list[str]:
             covariance_table(result.validation),
             whiteness_table(result.validation),
         ]
-        page += [f"`{method}`", "", _code("\n\n".join(text)), ""]
+        page += [f"`{method}`", "", code_block("\n\n".join(text)), ""]
     page += ["Cross-correlation of the error with the inputs, lag 0 (table 5.4):", "", _cross(results), ""]
     return page
 
@@ -129,7 +135,7 @@ def _variances(results: dict[str, Result]) -> str:
         )
         rows.append((f"output {name}", *(_mean_variance(e.output_mean, e.output_variance, factor) for e in errors)))
         rows.append((f"error {name}", *(_mean_variance(e.error_mean, e.error_variance, factor) for e in errors)))
-    return markdown_table(("mean, variance", *results), rows)
+    return markdown_table(("mean, variance", *results), markdown_cells(rows))
 
 
 def _mean_variance(mean: float, variance: float, factor: float) -> str:
@@ -142,7 +148,7 @@ def _cross(results: dict[str, Result]) -> str:
         for equation in result.validation.equations:
             values = [f"{name} {c.values[len(c.values) // 2]:+.2f}" for name, c in equation.cross.items()]
             rows.append((f"{equation.equation}, {method}", ", ".join(values)))
-    return markdown_table(("error of", "with"), rows)
+    return markdown_table(("error of", "with"), markdown_cells(rows))
 
 
 def _equations(results: dict[str, Result]) -> list[tuple[str, str]]:
@@ -172,12 +178,8 @@ def _figures(structure: Structure, results: dict[str, Result], folder: Path) -> 
     page += ["![characteristics](characteristics.png)", ""]
     if correlations:
         draw(folder / "correlations.png", correlations, columns=3, height=2.2)
-        page += [
-            "## Correlation of the error (figures 5.13 to 5.15, 5.19 to 5.21)",
-            "",
-            "![correlations](correlations.png)",
-            "",
-        ]
+        page += ["## Correlation of the error (figures 5.13 to 5.15, 5.19 to 5.21)", ""]
+        page += ["![correlations](correlations.png)", ""]
     return page
 
 
@@ -246,12 +248,12 @@ def _free_run(
     draw(folder / "free_run.png", panels)
     laws = characteristics(structure, description, estimates)
     slopes = ", ".join(f"{law.element} {law.unloading * 1e-3:.0f} kN/m" for law in laws if law.unloading is not None)
-    said = f"Unloading slopes: {slopes}." if slopes else "All elements unload as they load."
+    said = f"Unloading slopes: {markdown(slopes)}." if slopes else "All elements unload as they load."
     rows = comparison_table(compare(structure, description, simulated, smooth))
     return [
         "## Free run (figures 4.16 to 4.19, 6.13, 6.14)", "",
         f"The model with the characteristics from `{method}`, by Runge-Kutta from the initial velocities. {said}", "",
-        _code(rows), "", "![free run](free_run.png)", "",
+        code_block(rows), "", "![free run](free_run.png)", "",
     ]  # fmt: skip
 
 
@@ -260,7 +262,7 @@ def _jumps(result: Result, folder: Path) -> list[str]:
     page = ["## Jumps of the parameters (figure 4.13)", ""]
     if not found:
         return [*page, "None: the parameters change slowly, or the noise hides it.", ""]
-    page += [f"- {event.text}" for _, event in found]
+    page += [f"- {markdown(event.text)}" for _, event in found]
     marks = [(float(event.text.split("jumped at ")[1].split(" ms")[0]), "") for _, event in found]
     name, unit = result.description.equations[0], result.description.equation_units[0]
     shown, factor = READABLE[unit]
@@ -281,7 +283,7 @@ def _masses(recording: Recording, structure: Structure, folder: Path, end: float
     lines = [Line(time, _column(estimates, "parameters", k), n, spread=sigma(k)) for k, n in enumerate(names)]
     top = 2.0 * float(last.parameters.sum())
     draw(folder / "masses.png", [Panel("effective masses", "time in ms", "kg", lines, y_range=(0.0, top))], columns=1)
-    found = ", ".join(f"{name} {m:.0f} +- {s:.0f} kg" for name, m, s in zip(names, last.parameters, last.std))
+    found = markdown(", ".join(f"{name} {m:.0f} +- {s:.0f} kg" for name, m, s in zip(names, last.parameters, last.std)))
     page = ["## Effective masses (figures 4.12, 4.26)", "", f"{found}; together {last.parameters.sum():.0f} kg.", ""]
     return [*page, "![masses](masses.png)", ""]
 
@@ -292,7 +294,3 @@ def _time(estimates: Sequence[Estimate]) -> np.ndarray:
 
 def _column(estimates: Sequence[Estimate], field: str, k: int) -> np.ndarray:
     return np.array([getattr(e, field)[k] for e in estimates])
-
-
-def _code(text: str) -> str:
-    return f"```\n{text}\n```"

@@ -11,6 +11,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 
 from .attendance import PERIOD, Attendance, State, Word
+from .foreign_text import visible
 from .obituary import announce_end
 from .processes import this_host
 from .qos import EVERY_SAMPLE_SAID, LATCHED
@@ -85,7 +86,8 @@ class Attending:
 
     def _on_word(self, message: Message) -> None:
         if message.node != self.own.node or message.process != self.own.process or message.host != self.own.host:
-            self.others.hear(Word(*(getattr(message, field) for field in Word._fields)))
+            said = (getattr(message, field) for field in Word._fields)
+            self.others.hear(Word(*(visible(one) if isinstance(one, str) else one for one in said)))
 
     def _on_state(self, message: ReplayState) -> None:
         self.replay_state = message

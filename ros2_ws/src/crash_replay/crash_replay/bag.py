@@ -6,11 +6,9 @@ same bytes.
 """
 
 import re
-import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -18,6 +16,7 @@ from .bag_contents import Topic, bag_files, read_topics
 from .bag_writer import LATCHED, STREAM, TopicToWrite, write_mcap, write_metadata
 from .channel_messages import CARRIERS, SECOND, decode, encode
 from .message_types import decode_test, encode_test
+from .output import written
 from .recording import Channel, Recording, RecordingError, Test
 
 TEST_TOPIC, TEST_TYPE = "/test", "crash_msgs/msg/TestInfo"
@@ -38,28 +37,19 @@ def time_zero_ns(recording: Recording) -> int:
 def write_bag(recording: Recording, path: str | Path, overwrite: bool = False) -> Path:
     """Write a rosbag2 folder, or a single file where `path` ends in .mcap. Only a complete bag appears there.
 
-    Raises RecordingError where the name is taken (with `overwrite`: by something that is not a bag),
-    and where a channel's name or axis does not fit into a ROS topic.
+    Raises OutputError where it cannot be written, RecordingError where the name is taken (with `overwrite`: by
+    something that is not a bag), and where a channel's name or axis does not fit into a ROS topic.
     """
     path = Path(path)
-    single = path.suffix == ".mcap"
     _check_channels(recording.test)
     _check_free(path, overwrite)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as scratch:
-            written = Path(scratch) / path.name
-            if single:
-                write_mcap(written, _topics(recording.test), _messages(recording))
-            else:
-                written.mkdir()
-                file = written / f"{path.name}.mcap"
-                write_metadata(written, write_mcap(file, _topics(recording.test), _messages(recording)))
-            if path.is_dir():
-                shutil.rmtree(path)
-            written.replace(path)
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be written: {error.strerror or error}") from None
+    with written(path) as bag:
+        if path.suffix == ".mcap":
+            write_mcap(bag, _topics(recording.test), _messages(recording))
+        else:
+            bag.mkdir()
+            file = bag / f"{bag.name}.mcap"
+            write_metadata(bag, write_mcap(file, _topics(recording.test), _messages(recording)))
     return path
 
 

@@ -9,10 +9,11 @@ from contextlib import ExitStack
 from threading import Thread
 from typing import Any, TextIO
 
+from .foreign_text import visible, visible_lines
 from .keyboard import Keyboard
 from .keys import HELP, next_rate
 from .pacing import Pacing
-from .player import SECOND, CommandError, Mode, Player
+from .player import SECOND, CommandError, Player
 
 PERIOD = 0.1
 """Seconds between two drawings of the progress line."""
@@ -79,7 +80,7 @@ class Console:
 
     def say(self, line: str) -> None:
         """A line that stays, above the progress line."""
-        self._write((ERASE if self.drawn else "") + line + "\n" + self.drawn)
+        self._write((ERASE if self.drawn else "") + visible_lines(line) + "\n" + self.drawn)
 
     def _run(self) -> None:
         while not self.over:
@@ -94,7 +95,7 @@ class Console:
                 self._draw(f"{self.answer}; {line}" if fresh and self.answer else line)
 
     def _draw(self, line: str) -> None:
-        line = line[: shutil.get_terminal_size().columns - 1]
+        line = visible(line)[: shutil.get_terminal_size().columns - 1]
         if line != self.drawn:
             self.drawn = line
             self._write(ERASE + line)

@@ -12,9 +12,13 @@ import numpy as np
 
 from .bag import write_bag
 from .conditioning import CFC_CLASSES, filter_recording, remove_offset, select_channels
+from .fault import guarded
+from .foreign_text import visible
+from .output import check_outputs, write_text
 from .readers import READERS, read_source
 from .readers.units import G
-from .recording import Recording, RecordingError
+from .recording import Recording
+from .said import Parser, say
 from .sensor_checks import doubtful_channels, gaps_in_time
 
 SHOWN_IN = {"acceleration": (G, "g"), "force": (1e3, "kN"), "displacement": (1e-3, "mm")}
@@ -23,24 +27,23 @@ SHOWN_IN = {"acceleration": (G, "g"), "force": (1e3, "kN"), "displacement": (1e-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Exit status 0 done, 1 data at fault (one line on standard error), 2 usage."""
-    given = _parser().parse_args(arguments)
-    try:
-        recording = import_recording(given)
-        bag = write_bag(recording, given.to, overwrite=given.force)
-        if given.json:
-            _write_json(given.json, _found(recording, bag))
-    except RecordingError as error:
-        print(f"import: {error}", file=sys.stderr)
-        return 1
-    print(_report(recording, bag))
+    return guarded(lambda: run(_parser().parse_args(arguments)))
+
+
+def run(given: argparse.Namespace) -> None:
+    check_outputs({"--json": given.json}, [given.source, given.names], folders={"--to": given.to})
+    recording = import_recording(given)
+    bag = write_bag(recording, given.to, overwrite=given.force)
+    if given.json:
+        write_text(given.json, json.dumps(_found(recording, bag), indent=1) + "\n")
+    say(_report(recording, bag))
     kept = [
         what
         for what, done in (("zero offset kept (--offset)", given.offset), ("no filter (--cfc)", given.cfc))
         if not done
     ]
     if kept:
-        print(f"as recorded: {', '.join(kept)}")
-    return 0
+        say(f"as recorded: {', '.join(kept)}")
 
 
 def import_recording(given: argparse.Namespace) -> Recording:
@@ -57,9 +60,7 @@ def import_recording(given: argparse.Namespace) -> Recording:
 
 def _parser() -> argparse.ArgumentParser:
     forms = "; ".join(reader.expects for reader in READERS)
-    parser = argparse.ArgumentParser(
-        prog="import", description=f"Make a bag of a recording. SOURCE is one of: {forms}."
-    )
+    parser = Parser(prog="import", description=f"Make a bag of a recording. SOURCE is one of: {forms}.")
     parser.add_argument("source", type=Path, metavar="SOURCE")
     parser.add_argument(
         "--to", type=Path, required=True, metavar="BAG", help="rosbag2 folder, or one file if it ends in .mcap"
@@ -120,7 +121,7 @@ def _report(recording: Recording, bag: Path) -> str:
     else:
         lines += ["", "initial velocity not given: every body is at rest until the impact"]
     lines += ["", *(f"- {note}" for note in test.notes)] if test.notes else []
-    return "\n".join([*lines, "", f"written to {bag} ({_size(bag)})"])
+    return "\n".join([*lines, "", f"written to {visible(bag)} ({_size(bag)})"])
 
 
 def _size(bag: Path) -> str:
@@ -149,13 +150,6 @@ def _found(recording: Recording, bag: Path) -> dict[str, Any]:
         "initial_displacement": dict(test.initial_displacement),
         "notes": list(test.notes),
     }
-
-
-def _write_json(path: Path, found: dict[str, Any]) -> None:
-    try:
-        path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
 if __name__ == "__main__":

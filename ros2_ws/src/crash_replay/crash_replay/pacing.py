@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from threading import Condition
 from typing import NamedTuple, Protocol
 
+from .fault import Fault
 from .player import Batch, CommandError, Mode, Player, Tally, suitable_block
 from .recording import Recording
 from .scheduling import sleep_exactly
@@ -35,7 +36,7 @@ class Outcome(NamedTuple):
     lacking: list[str]  # a line on each who lacks samples
 
 
-class SubscribersMissing(Exception):
+class SubscribersMissing(Fault):
     """Not all subscribers that were asked for have come; the message is one readable line."""
 
 

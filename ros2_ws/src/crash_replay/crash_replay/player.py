@@ -14,13 +14,15 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from .fault import Fault
+
 LOWEST_RATE, HIGHEST_RATE = 0.001, 1000.0
 SECOND = 1_000_000_000
 SINGLES, BLOCKS = 1000.0, 400.0
 """Messages a second: at most of one sample each, and about so many of several."""
 
 
-class CommandError(ValueError):
+class CommandError(Fault):
     """A command that cannot be followed; the message says why in one line."""
 
 

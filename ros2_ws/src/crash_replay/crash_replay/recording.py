@@ -11,6 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .fault import Fault
+from .foreign_text import visible
+
 SI_UNIT = {
     "acceleration": "m/s^2",
     "velocity": "m/s",
@@ -22,7 +25,7 @@ SI_UNIT = {
 """The quantities a channel may have, and the unit its values are in."""
 
 
-class RecordingError(ValueError):
+class RecordingError(Fault):
     """The data or a file that describes it is at fault; the message is one readable line."""
 
 
@@ -41,7 +44,7 @@ class Sample(NamedTuple):
 
 @dataclass(frozen=True)
 class Channel:
-    """One sensor's name and meaning; its values are a column of `Recording.values`."""
+    """One sensor's name and meaning; its values are a column of `Recording.values`. Its texts can be printed."""
 
     name: str
     quantity: str  # a key of SI_UNIT
@@ -50,6 +53,8 @@ class Channel:
     source: str = ""  # file, column or curve
 
     def __post_init__(self):
+        for text in ("name", "quantity", "body", "axis", "source"):
+            object.__setattr__(self, text, visible(getattr(self, text)))
         if self.quantity not in SI_UNIT:
             raise RecordingError(
                 f"channel {self.name}: quantity must be one of {', '.join(SI_UNIT)}, got {self.quantity!r}"
@@ -62,7 +67,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Test:
-    """What a test is, without its samples."""
+    """What a test is, without its samples. Its texts can be printed."""
 
     id: str
     channels: tuple[Channel, ...]
@@ -75,6 +80,11 @@ class Test:
     __test__ = False  # not a pytest class
 
     def __post_init__(self):
+        for text in ("id", "title", "source"):
+            object.__setattr__(self, text, visible(getattr(self, text)))
+        for by_body in ("initial_velocity", "initial_displacement"):
+            object.__setattr__(self, by_body, {visible(body): value for body, value in getattr(self, by_body).items()})
+        object.__setattr__(self, "notes", tuple(map(visible, self.notes)))
         names = [channel.name for channel in self.channels]
         doubled = sorted({name for name in names if names.count(name) > 1})
         if doubled:

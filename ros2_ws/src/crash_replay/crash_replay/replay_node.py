@@ -10,6 +10,7 @@ from typing import Any
 import rclpy
 from crash_msgs.srv import Burst, Seek, SetRate, Step
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.exceptions import ParameterException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -19,12 +20,13 @@ from std_srvs.srv import Trigger
 
 from .bag import read_bag
 from .console import Console, wanted
-from .pacing import Outcome, Pacing, SubscribersMissing
+from .fault import guarded, tell
+from .pacing import Outcome, Pacing
 from .player import SECOND, CommandError, Player
-from .recording import RecordingError
 from .replay_parameters import LIVE, ParameterError, checked, declare_parameters, names_in, window_of
 from .replay_topics import ReplayTopics
 from .ros_runtime import acknowledge_promptly, spin
+from .said import say
 from .samples_again import serve_samples
 from .selection import SelectionError, samples_within, select_channels
 
@@ -128,15 +130,18 @@ class ReplayNode(Node):
 
 
 def main() -> int:
+    return guarded(_main, also=(ParameterException,))
+
+
+def _main() -> int:
     acknowledge_promptly()
     # Ctrl-C must end the replay between two messages, not take the context away under it.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = ReplayNode()
-    except (ParameterError, RecordingError, SelectionError, CommandError) as error:
-        print(f"error: {error}", file=sys.stderr)
+    except BaseException:
         rclpy.shutdown()
-        return 1
+        raise
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: setattr(node.pacing, "stopped", True))
     executor, done = EventsExecutor(), Future()
@@ -145,13 +150,10 @@ def main() -> int:
     services.start()
     try:
         outcome = node.replay()
-        print(outcome.text, flush=True)
+        say(outcome.text)
         for line in outcome.lacking:
-            print(f"incomplete: {line}", file=sys.stderr, flush=True)
+            tell(f"incomplete: {line}")
         return 1 if outcome.lacking else 0
-    except SubscribersMissing as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
     finally:
         node.topics.audience.leave()
         done.set_result(None)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
+from .fault import Fault
 from .player import HIGHEST_RATE, LOWEST_RATE
 from .selection import Window
 
@@ -17,7 +18,7 @@ LIVE = ("rate", "loop", "from", "until")
 """Those that may be set at any time."""
 
 
-class ParameterError(ValueError):
+class ParameterError(Fault):
     """A parameter is missing or not what it must be; the message is one readable line."""
 
 

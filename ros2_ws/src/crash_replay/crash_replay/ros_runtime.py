@@ -2,7 +2,6 @@
 
 import os
 import signal
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +13,8 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+
+from .fault import guarded, tell
 
 PROFILES = Path(__file__).with_name("fastdds.xml")
 PROFILES_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
@@ -45,9 +46,13 @@ def run(
 ) -> int:
     """Make a node and run it until the future is done or a signal ends it -> exit status.
 
-    at_fault: what data, model or parameters raise: one line on standard error, exit status 1; close: called at the end,
-    gives a line on what is incomplete, which then is the exit status as well.
+    at_fault: what may be raised that is no fault of the program, beside `Fault`; close: called at the end, gives a line
+    on what is incomplete, which then is the exit status as well.
     """
+    return guarded(lambda: _run(make, until, close), also=(*at_fault, ParameterException))
+
+
+def _run(make: Callable[[], Node], until: Callable[[Node], Future], close: Callable[[Node], str | None]) -> int:
     acknowledge_promptly()
     # A signal must end the node between two callbacks, not take the context away under the executor.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
@@ -69,14 +74,11 @@ def run(
         spin(executor, done)
     except ExternalShutdownException:
         pass
-    except (*at_fault, ParameterException) as error:
-        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
-        return 1
     finally:
         executor.shutdown()  # before the node: it holds the node's events, and a late end of it crashes the process
         if node is not None:
             if incomplete := close(node):
-                print(incomplete, file=sys.stderr, flush=True)
+                tell(incomplete)
             node.destroy_node()
         rclpy.try_shutdown()
     return 1 if incomplete else 0

@@ -8,12 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .fault import Fault
 from .recording import Recording
 
 SECOND = 1_000_000_000
 
 
-class SelectionError(ValueError):
+class SelectionError(Fault):
     """Nothing would be left to replay; the message is one readable line."""
 
 

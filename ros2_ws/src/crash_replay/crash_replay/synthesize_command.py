@@ -11,7 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from .bag import write_bag
-from .recording import Recording, RecordingError
+from .fault import guarded
+from .foreign_text import visible
+from .output import check_outputs, write_text
+from .recording import Recording
+from .said import Parser, say
 from .synthetic.hidden.bundled import NAME, bundled_case
 from .synthetic.hidden.cases import EFFECTS, HiddenCase, draw_case
 from .synthetic.hidden.structures import STRUCTURES
@@ -19,10 +23,12 @@ from .synthetic.recordings import BUILDERS, BUNDLED_SEED, SCENARIOS
 from .synthetic.truth_file import truth_text
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        prog="synthesize", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def main() -> int:
+    return guarded(command)
+
+
+def command() -> None:
+    parser = Parser(prog="synthesize", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument(
         "scenario", nargs="?", metavar="SCENARIO", choices=[*BUILDERS, *STRUCTURES],
@@ -55,24 +61,20 @@ def main() -> None:
     parser.add_argument("--speed", type=_positive, default=1.0, metavar="FACTOR", help="times the scenario's speed")
     arguments = parser.parse_args()
     if arguments.list:
-        print("\n".join(f"{name:22} {build().title}" for name, build in BUILDERS.items()))
+        say("\n".join(f"{name:22} {build().title}" for name, build in BUILDERS.items()))
         return
     if arguments.to is None:
         parser.error("the argument --to is required: where to write")
     if (arguments.hide is not None) != (arguments.scenario in STRUCTURES):
         parser.error(f"--hide goes with one of {', '.join(STRUCTURES)}, which need it (none: nothing is hidden)")
-    try:
-        if arguments.all:
-            for name in SCENARIOS:
-                _write(name, arguments.to / f"{name}.mcap", arguments, replace=True)
-            _write_hidden(bundled_case(), arguments.to / f"{NAME}.mcap", arguments, replace=True)
-        elif arguments.hide:
-            _write_hidden(_case(arguments), arguments.to, arguments, arguments.force)
-        else:
-            _write(arguments.scenario, arguments.to, arguments, arguments.force)
-    except (RecordingError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(1)
+    if arguments.all:
+        for name in SCENARIOS:
+            _write(name, arguments.to / f"{name}.mcap", arguments, replace=True)
+        _write_hidden(bundled_case(), arguments.to / f"{NAME}.mcap", arguments, replace=True)
+    elif arguments.hide:
+        _write_hidden(_case(arguments), arguments.to, arguments, arguments.force)
+    else:
+        _write(arguments.scenario, arguments.to, arguments, arguments.force)
 
 
 def _write(name: str, path: Path, arguments: argparse.Namespace, replace: bool) -> None:
@@ -96,13 +98,14 @@ def _write_hidden(case: HiddenCase, path: Path, arguments: argparse.Namespace, r
 
 def _write_files(recording: Recording, path: Path, texts: dict[str, str], replace: bool) -> None:
     """The bag, and NAME.WHAT.yaml beside it."""
+    stem = path.stem if path.suffix == ".mcap" else path.name
+    beside = {what: path.with_name(f"{stem}.{what}.yaml") for what in texts}
+    check_outputs({f"{what} of --to": file for what, file in beside.items()}, [])
     write_bag(recording, path, overwrite=replace)
-    beside = []
-    for what, text in texts.items():
-        beside.append(f"{path.stem if path.suffix == '.mcap' else path.name}.{what}.yaml")
-        (path.parent / beside[-1]).write_text(text, encoding="utf-8")
-    named = ", ".join(f"{what} in {name}" for what, name in zip(texts, beside))
-    print(f"{path}: {len(recording)} samples, {len(recording.test.channels)} channels; {named}")
+    for what, file in beside.items():
+        write_text(file, texts[what])
+    named = ", ".join(f"{what} in {visible(file.name)}" for what, file in beside.items())
+    say(f"{visible(path)}: {len(recording)} samples, {len(recording.test.channels)} channels; {named}")
 
 
 def _hidden(text: str) -> tuple[str, str]:
@@ -134,4 +137,4 @@ _not_negative = _number(float, lambda value: value >= 0.0, "a number of 0 or mor
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

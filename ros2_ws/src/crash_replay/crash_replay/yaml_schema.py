@@ -13,6 +13,7 @@ from pydantic import BaseModel, ValidationError
 from ruamel.yaml import YAML, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
+from .foreign_text import visible
 from .recording import RecordingError
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -35,7 +36,7 @@ def load_yaml(path: str | Path, model: type[Model]) -> Model:
     try:
         # pure: the C loader reads YAML 1.1, in which the axis `y` is a truth value
         tree = YAML(typ="safe", pure=True).compose(text)
-        data = YAML(typ="safe", pure=True).load(text)
+        data = _printable(YAML(typ="safe", pure=True).load(text))
     except YAMLError as error:
         raise RecordingError(f"{path}:{_line_of(error)}: not valid YAML: {_reason(error)}") from None
     if not isinstance(data, dict):
@@ -49,6 +50,15 @@ def load_yaml(path: str | Path, model: type[Model]) -> Model:
             key=lambda e: (len(_keys(tree, e["loc"])), e["type"] == "extra_forbidden"),
         )
         raise RecordingError(_message(path, tree, model, error)) from None
+
+
+def _printable(value: Any) -> Any:
+    """The same with texts and keys that can be printed, whatever escapes the file has in its quotes."""
+    if isinstance(value, str):
+        return visible(value.strip())
+    if isinstance(value, dict):
+        return {_printable(key): _printable(item) for key, item in value.items()}
+    return [_printable(item) for item in value] if isinstance(value, list) else value
 
 
 def _message(path: Path, tree: Node, model: type[BaseModel], error: dict[str, Any]) -> str:

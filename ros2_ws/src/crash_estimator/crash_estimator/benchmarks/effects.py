@@ -7,7 +7,10 @@ import sys
 from pathlib import Path
 from time import monotonic
 
-from ..cli.common import guarded
+from crash_replay.fault import guarded
+from crash_replay.output import check_outputs
+from crash_replay.said import Parser, say
+
 from ..figures import write_markdown
 from .effects_judge import WANTED, judge, kind_of
 from .effects_page import page
@@ -20,8 +23,16 @@ TIMED = ("coulomb_friction", "viscous_damping", "plastic_unloading", "added_mass
 """Hidden in the dummy, one at a time, where the time is taken."""
 
 
+PAGE = Path("missing-effects.md")
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="effects", description=__doc__.partition(": ")[2])
+    os.environ.update(ONE_THREAD)
+    sys.exit(guarded(lambda: _command(_parser().parse_args())))
+
+
+def _parser() -> Parser:
+    parser = Parser(prog="effects", description=__doc__.partition(": ")[2])
     parser.add_argument(
         "--cases", type=int, metavar="N", help="only the first N of the plan, which is mixed; default all"
     )
@@ -31,20 +42,26 @@ def main() -> None:
     parser.add_argument(
         "--results", type=Path, default=Path("out/missing-effects.jsonl"), help="resumed where it exists"
     )
-    parser.add_argument("--to", type=Path, default=Path("docs/missing-effects.md"), metavar="PAGE.md")
+    parser.add_argument(
+        "--to", type=Path, metavar="PAGE.md", help=f"default: docs/{PAGE}; of a part of the plan: out/{PAGE}"
+    )
     parser.add_argument("--processes", type=int, default=os.cpu_count(), metavar="N")
     parser.add_argument("--fresh", action="store_true", help="drop the results there are")
     parser.add_argument("--page", action="store_true", help="judge nothing more, only write the page")
-    arguments = parser.parse_args()
-    os.environ.update(ONE_THREAD)
-    sys.exit(guarded(lambda: _one(arguments.case) if arguments.case else _run(arguments)))
+    return parser
 
 
-def _one(name: str) -> None:
-    print(json.dumps(judge(case_of(name)), indent=1))
+def _command(arguments: argparse.Namespace) -> None:
+    if arguments.case:
+        say(json.dumps(judge(case_of(arguments.case)), indent=1))
+    else:
+        _run(arguments)
 
 
 def _run(arguments: argparse.Namespace) -> None:
+    part = arguments.cases is not None or arguments.like is not None
+    to = arguments.to or Path("out" if part else "docs") / PAGE
+    check_outputs({"--to": to, "--results": arguments.results}, [])
     if arguments.fresh:
         arguments.results.unlink(missing_ok=True)
     cases = [c for c in plan(arguments.seeds_from)[: arguments.cases] if (arguments.like or "") in c.name]
@@ -52,16 +69,15 @@ def _run(arguments: argparse.Namespace) -> None:
     done = read(arguments.results)
     if not arguments.page:
         left = [c for c in cases if c.name not in done]
-        print(f"{len(cases)} cases, {len(cases) - len(left)} of them in {arguments.results}", flush=True)
+        say(f"{len(cases)} cases, {len(cases) - len(left)} of them in {arguments.results}")
         _add(judged(left, arguments.processes), len(left), arguments.results, done)
         clocked = [c for c in times if f"time {c.name}" not in done]
         if clocked:  # one after the other, with nothing beside them
             _add(in_processes(timed, clocked, 1), len(clocked), arguments.results, done)
     rows = [done[c.name] for c in cases if c.name in done]
     clocked = [done[f"time {c.name}"] for c in times if f"time {c.name}" in done]
-    arguments.to.parent.mkdir(parents=True, exist_ok=True)
-    write_markdown(arguments.to, [page(rows, clocked, len(cases), code())])
-    print(f"{arguments.to}: {len(rows)} of {len(cases)} cases")
+    write_markdown(to, [page(rows, clocked, len(cases), code())])
+    say(f"{to}: {len(rows)} of {len(cases)} cases")
 
 
 def _add(rows, count: int, results: Path, done: dict[str, dict]) -> None:
@@ -70,7 +86,7 @@ def _add(rows, count: int, results: Path, done: dict[str, dict]) -> None:
         append(results, row)
         done[row["case"]] = row
         ahead = (monotonic() - start) / n * (count - n) / 60.0
-        print(f"{n}/{count}, {ahead:.0f} min to go: {row['case']}: {_outcome(row)}", flush=True)
+        say(f"{n}/{count}, {ahead:.0f} min to go: {row['case']}: {_outcome(row)}")
 
 
 def _outcome(row: dict) -> str:

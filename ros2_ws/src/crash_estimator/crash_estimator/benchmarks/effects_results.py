@@ -7,6 +7,7 @@ from hashlib import sha256
 from multiprocessing import get_context
 from pathlib import Path
 
+from crash_replay.output import named
 from crash_replay.synthetic import hidden
 
 from ..core import diagnosis, effects
@@ -46,10 +47,12 @@ def read(path: Path) -> dict[str, dict]:
 
 
 def append(path: Path, row: dict) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    cut_off = path.exists() and path.read_bytes()[-1:] not in (b"", b"\n")
-    with path.open("a", encoding="utf-8") as file:
-        file.write(("\n" if cut_off else "") + json.dumps(row) + "\n")
+    """At the file's end: a log may be cut off, and is read all the same."""
+    with named(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        cut_off = path.exists() and path.read_bytes()[-1:] not in (b"", b"\n")
+        with path.open("a", encoding="utf-8") as file:
+            file.write(("\n" if cut_off else "") + json.dumps(row) + "\n")
 
 
 def judged(cases: Iterable[Case], processes: int) -> Iterator[dict]:

@@ -9,7 +9,10 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ..cli.common import guarded
+from crash_replay.fault import guarded
+from crash_replay.output import check_outputs
+from crash_replay.said import Parser, say
+
 from ..demo.domain import own_environment
 from ..figures import markdown_table, write_markdown
 from ..tables import table
@@ -37,28 +40,33 @@ six passes in turns with the reference's, their ratio is the median of the six r
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="benchmark", description=__doc__.partition(": ")[2])
-    parser.add_argument("--to", default="docs", metavar="DIR", help="folder of benchmark.md")
+    sys.exit(guarded(lambda: benchmark(_parser().parse_args())))
+
+
+def _parser() -> Parser:
+    parser = Parser(prog="benchmark", description=__doc__.partition(": ")[2])
+    parser.add_argument("--to", metavar="DIR", help="folder of benchmark.md (default: docs; with --quick: out)")
     parser.add_argument("--quick", action="store_true", help="see that it works; the figures say little")
     parser.add_argument("--hold", type=float, default=Effort.hold, help="s that the highest rate must be held")
     parser.add_argument("--only", nargs="*", choices=PARTS, default=PARTS, help="some of the rows; no page is written")
-    arguments = parser.parse_args()
-    sys.exit(guarded(lambda: benchmark(arguments)))
+    return parser
 
 
 def benchmark(arguments: argparse.Namespace) -> None:
+    page_file = Path(arguments.to or ("out" if arguments.quick else "docs")) / "benchmark.md"
+    check_outputs({"--to": page_file}, [])
     load, rows, start = os.getloadavg()[0], [], time.monotonic()
     effort = QUICK if arguments.quick else Effort(hold=arguments.hold)
     with tempfile.TemporaryDirectory(prefix="benchmark.") as scratch:
         for title, part in _parts(Path(scratch), effort, arguments):
             print(f"{time.monotonic() - start:5.0f} s  {title}", file=sys.stderr, flush=True)
             rows += part()
-    print(table(HEAD, [row.cells() for row in rows]))
+    say(table(HEAD, [row.cells() for row in rows]))
     if tuple(arguments.only) == PARTS:
         here = {"machine": platform.machine(), "cores": os.cpu_count()}
         about = ABOUT.format(**here, load=load, when=time.strftime("%Y-%m-%d"))
         page = [about, markdown_table(HEAD, [row.cells() for row in rows]), ""]
-        print(write_markdown(Path(arguments.to) / "benchmark.md", page))
+        say(write_markdown(page_file, page))
 
 
 def _parts(folder: Path, effort: Effort, arguments) -> Iterator[tuple[str, Callable[[], list[Row]]]]:

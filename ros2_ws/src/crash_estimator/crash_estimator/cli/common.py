@@ -1,34 +1,22 @@
-"""What the commands share: exit statuses, settings on the command line, JSON without NaN."""
+"""What the commands share: what they read and write, settings on the command line, JSON without NaN."""
 
 import argparse
 import json
 import math
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from crash_replay.bag import read_bag
+from crash_replay.output import check_outputs, write_text
 from crash_replay.recording import Recording, RecordingError
 
 from ..core.effects import EFFECTS
 from ..core.effects.base import Effect
 from ..core.effects.user import load_effects
 from ..core.structure import ModelError
-
-
-def guarded(command: Callable[[], int | None]) -> int:
-    """Run a command -> exit status: 0 done, or what it says; 1 with one line on standard error where data or model
-    are at fault."""
-    try:
-        return command() or 0
-    except (RecordingError, ModelError, OSError) as error:
-        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 130
+from ..model_file import model_path
 
 
 def read_crash(bag: str) -> Recording:
@@ -40,6 +28,13 @@ def read_crash(bag: str) -> Recording:
             f"{bag}: its last sample is {-end:.4g} ms before the impact (time zero): there is nothing to learn from"
         )
     return recording
+
+
+def check_written(arguments: argparse.Namespace, *recordings: str | None, **outputs: str | None) -> None:
+    """Before anything is read: nothing is written onto the recordings, the model or the effects; `json="out.json"` is
+    `--json out.json`. Raises OutputError."""
+    read = [*recordings, model_path(arguments.model), arguments.effects]
+    check_outputs({f"--{option}": path for option, path in outputs.items()}, read)
 
 
 def add_effects_option(parser: argparse.ArgumentParser) -> None:
@@ -70,7 +65,7 @@ def parse_settings(pairs: list[str]) -> dict[str, float | int | bool]:
 
 def write_json(path: str | Path, content: Any) -> None:
     """Strict JSON: arrays become lists, NaN and infinity become null."""
-    Path(path).write_text(json.dumps(_plain(content), indent=1, allow_nan=False) + "\n")
+    write_text(path, json.dumps(_plain(content), indent=1, allow_nan=False) + "\n")
 
 
 def _plain(value: Any) -> Any:

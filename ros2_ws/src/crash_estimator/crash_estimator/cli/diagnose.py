@@ -2,59 +2,54 @@
 
 import argparse
 import sys
+from io import StringIO
 from itertools import permutations
-from pathlib import Path
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 
 from crash_replay.bag import read_bag
+from crash_replay.fault import guarded
+from crash_replay.foreign_text import visible
+from crash_replay.output import write_text
+from crash_replay.said import Parser, say
 
 from ..core.diagnosis.diagnosis import Diagnosis, diagnose
 from ..core.effects.base import Effect, UnloadingSlope
 from ..core.effects.targets import key_of
-from ..core.structure import EffectSpec, ModelError
+from ..core.structure import EffectSpec
 from ..diagnosis_doubt import doubt
 from ..diagnosis_tables import diagnosis_tables
 from ..model_file import load_model, model_path, ready_models
-from .common import add_effects_option, effects_of, guarded, write_json
+from .common import add_effects_option, check_written, effects_of, write_json
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="diagnose", description=__doc__)
+    sys.exit(guarded(lambda: run(_parser().parse_args())))
+
+
+def _parser() -> Parser:
+    parser = Parser(prog="diagnose", description=__doc__)
     parser.add_argument("bags", nargs="+", metavar="BAG", help="recordings of one structure, best at different speeds")
     parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
     parser.add_argument("--apply", metavar="NEW_MODEL.yaml", help="write the model with the effects that were found")
     parser.add_argument("--json", metavar="FILE", help="write everything that was found")
     add_effects_option(parser)
-    arguments = parser.parse_args()
-    sys.exit(guarded(lambda: run(arguments)))
+    return parser
 
 
 def run(arguments: argparse.Namespace) -> None:
+    check_written(arguments, *arguments.bags, json=arguments.json, apply=arguments.apply)
     effects = effects_of(arguments)
     structure = load_model(arguments.model)
-    for option, path in (("--json", arguments.json), ("--apply", arguments.apply)):
-        if path:
-            _writable(option, Path(path))
     found = diagnose(structure, [read_bag(bag) for bag in arguments.bags], effects)
     if arguments.json:  # files before words: `| head` ends this at a line that nobody reads
         write_json(arguments.json, found.as_json())
     added = apply(found, structure.effects, effects, arguments.model, arguments.apply) if arguments.apply else ""
-    print("\n".join(line for line in (found.text, doubt(found)) if line))
-    print(f"\n{diagnosis_tables(found)}")
+    say("\n".join(line for line in (found.text, doubt(found)) if line))
+    say(f"\n{diagnosis_tables(found)}")
     if arguments.apply:
-        print(f"\n{arguments.apply}: {arguments.model} with {added or 'nothing added'}")
-
-
-def _writable(option: str, path: Path) -> None:
-    """Make its folder. Raises ModelError where it cannot be a file: better now than after the search."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ModelError(f"{option} {path}: {path.parent} cannot be a folder ({error.strerror})") from None
-    if path.is_dir():
-        raise ModelError(f"{option} {path} is a folder: give the file to write")
+        say(f"\n{visible(arguments.apply)}: {visible(arguments.model)} with {added or 'nothing added'}")
 
 
 def apply(found: Diagnosis, had: tuple[EffectSpec, ...], effects: dict[str, Effect], model: str, target: str) -> str:
@@ -70,8 +65,9 @@ def apply(found: Diagnosis, had: tuple[EffectSpec, ...], effects: dict[str, Effe
             instead = ", takes the place of the element's unloading" * isinstance(effects[spec.type], UnloadingSlope)
             entry.yaml_add_eol_comment(f"+- {step.std:.2g} {step.unit}{instead}", "coefficient")
         content["effects"].append(entry)
-    with Path(target).open("w", encoding="utf-8") as file:
-        yaml.dump(content, file)
+    text = StringIO()
+    yaml.dump(content, text)
+    write_text(target, text.getvalue())
     return ", ".join(f"{spec.type} on {spec.target}" for spec in added)
 
 
@@ -79,7 +75,7 @@ def _entry(spec: EffectSpec, effect: Effect, bodies: list[str]) -> CommentedMap:
     key = key_of(effect)
     entry = CommentedMap({"type": spec.type, key: spec.target})
     if key == "between":
-        pair = next(p for p in permutations(bodies, 2) if "-".join(p) == spec.target)
+        pair = next(p for p in permutations(bodies, 2) if "-".join(map(visible, p)) == spec.target)
         entry[key] = list(pair)
     if spec.coefficient is not None:
         entry["coefficient"] = float(f"{spec.coefficient:.6g}")

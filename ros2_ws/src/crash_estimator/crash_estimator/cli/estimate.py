@@ -5,7 +5,9 @@ import sys
 
 import numpy as np
 
+from crash_replay.fault import guarded
 from crash_replay.recording import Recording
+from crash_replay.said import Parser, say
 
 from ..core.errors import EquationError, equation_errors
 from ..core.estimate import Description, ElementState, Estimate, ParameterStatus
@@ -13,11 +15,15 @@ from ..core.fold import run
 from ..core.methods import METHODS, make_estimator
 from ..model_file import load_model, ready_models
 from ..tables import besides_table, error_table, known_effects_table, never_touches, parameter_table
-from .common import add_effects_option, effects_of, guarded, parse_settings, read_crash, write_json
+from .common import add_effects_option, check_written, effects_of, parse_settings, read_crash, write_json
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="estimate", description=__doc__)
+    sys.exit(guarded(lambda: estimate(_parser().parse_args())))
+
+
+def _parser() -> Parser:
+    parser = Parser(prog="estimate", description=__doc__)
     parser.add_argument("bag", metavar="BAG", help="a recording: rosbag2 folder or .mcap file")
     parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
     parser.add_argument("--method", default="constrained_kalman", choices=METHODS)
@@ -29,11 +35,11 @@ def main() -> None:
     )
     add_effects_option(parser)
     parser.add_argument("--json", metavar="FILE", help="write everything that was found")
-    arguments = parser.parse_args()
-    sys.exit(guarded(lambda: estimate(arguments)))
+    return parser
 
 
 def estimate(arguments: argparse.Namespace) -> None:
+    check_written(arguments, arguments.bag, json=arguments.json)
     structure = load_model(arguments.model)
     recording = read_crash(arguments.bag)
     settings = parse_settings(arguments.set) | ({"effective_mass": True} if arguments.effective_mass else {})
@@ -41,21 +47,18 @@ def estimate(arguments: argparse.Namespace) -> None:
     estimator = make_estimator(structure, recording.test, arguments.method, effects=effects, **settings)
     estimates = run(estimator, recording.samples())
     description, errors = estimator.description, equation_errors(estimator.description, estimates)
-    print(f"{recording.test.id}: {len(recording)} samples, model {description.model}, method {description.method}")
-    print()
-    print(parameter_table(description, estimates))
-    print()
+    if arguments.json:  # files before words: `| head` ends this at a line that nobody reads
+        write_json(arguments.json, as_json(recording, description, estimates, errors))
+    say(f"{recording.test.id}: {len(recording)} samples, model {description.model}, method {description.method}\n")
+    say(f"{parameter_table(description, estimates)}\n")
     if known := known_effects_table(structure.effects, effects, description):
-        print(f"{known}\n")
-    print(error_table(errors))
+        say(f"{known}\n")
+    say(error_table(errors))
     for k, name in enumerate(description.elements):
         if all(estimate.state[k] == ElementState.APART for estimate in estimates):
-            print(f"\n{never_touches(name)}")
+            say(f"\n{never_touches(name)}")
     if description.extra:
-        print()
-        print(besides_table(description, estimates[-1]))
-    if arguments.json:
-        write_json(arguments.json, as_json(recording, description, estimates, errors))
+        say(f"\n{besides_table(description, estimates[-1])}")
 
 
 def as_json(

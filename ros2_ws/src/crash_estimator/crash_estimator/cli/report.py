@@ -7,19 +7,26 @@ from pathlib import Path
 import numpy as np
 
 from crash_replay.conditioning import CFC_CLASSES
+from crash_replay.fault import guarded
+from crash_replay.foreign_text import visible
+from crash_replay.output import OutputError
+from crash_replay.said import Parser, say
 
 from ..core.methods import METHODS
-from ..core.structure import ModelError
 from ..model_file import load_model, ready_models
 from ..report_page import write_report
-from .common import add_effects_option, effects_of, guarded, read_crash
+from .common import add_effects_option, check_written, effects_of, read_crash
 from .simulate import smoother
 
 SHOWN = ["rls", "mrls", "constrained_kalman"]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="report", description=__doc__.partition(": ")[2])
+    sys.exit(guarded(lambda: report(_parser().parse_args())))
+
+
+def _parser() -> Parser:
+    parser = Parser(prog="report", description=__doc__.partition(": ")[2])
     parser.add_argument("bag", metavar="BAG", help="a recording: rosbag2 folder or .mcap file")
     parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
     parser.add_argument("--to", required=True, metavar="DIR", help="folder for report.md and its figures")
@@ -30,22 +37,22 @@ def main() -> None:
         "--cfc", type=int, choices=(0, *CFC_CLASSES), default=None, help="filter of the free run's signals; 0: none"
     )
     add_effects_option(parser)
-    arguments = parser.parse_args()
-    sys.exit(guarded(lambda: report(arguments)))
+    return parser
 
 
 def report(arguments: argparse.Namespace) -> None:
-    structure = load_model(arguments.model)
-    recording = read_crash(arguments.bag)
     folder = Path(arguments.to)
     if folder.exists() and not folder.is_dir():
-        raise ModelError(f"{folder} is a file: --to takes a folder")
+        raise OutputError(f"{visible(folder)} is a file: --to takes a folder")
+    check_written(arguments, arguments.bag, to=folder / "report.md")
+    structure = load_model(arguments.model)
+    recording = read_crash(arguments.bag)
     smooth, said = smoother(recording, arguments.cfc)
-    page = write_report(
+    page, figures = write_report(
         recording, structure, list(dict.fromkeys(arguments.methods)), folder, arguments.end, smooth, said,
         effects=effects_of(arguments),
     )  # fmt: skip
-    print(f"{recording.test.id}: {page} and {len(list(folder.glob('*.png')))} figures")
+    say(f"{recording.test.id}: {visible(page)} and {figures} figures")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,9 @@ import numpy as np
 
 from crash_replay.bag import read_bag
 from crash_replay.conditioning import CFC_CLASSES, cfc_filter
+from crash_replay.fault import guarded
 from crash_replay.recording import Recording
+from crash_replay.said import Parser, say
 
 from ..core.characteristic import Characteristic, characteristics
 from ..core.effects.applied import applied
@@ -22,14 +24,18 @@ from ..core.structure import ModelError, Structure
 from ..model_file import load_model, ready_models
 from ..tables import table
 from ..validation_tables import comparison_table
-from .common import add_effects_option, effects_of, guarded, parse_settings, read_crash, write_json
+from .common import add_effects_option, check_written, effects_of, parse_settings, read_crash, write_json
 
 FILTER = 60
 """CFC of signals that are rated, unless told otherwise: that of a vehicle structure's acceleration (SAE J211-1)."""
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="simulate", description=__doc__.partition("\n\n")[0])
+    sys.exit(guarded(lambda: simulate(_parser().parse_args())))
+
+
+def _parser() -> Parser:
+    parser = Parser(prog="simulate", description=__doc__.partition("\n\n")[0])
     parser.add_argument("bag", metavar="BAG", help="a recording: rosbag2 folder or .mcap file")
     parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
     parser.add_argument("--method", default="constrained_kalman", choices=[m for m in METHODS if m != "effective_mass"])
@@ -43,11 +49,11 @@ def main() -> None:
     )
     add_effects_option(parser)
     parser.add_argument("--json", metavar="FILE", help="write everything that was found")
-    arguments = parser.parse_args()
-    sys.exit(guarded(lambda: simulate(arguments)))
+    return parser
 
 
 def simulate(arguments: argparse.Namespace) -> None:
+    check_written(arguments, arguments.bag, arguments.source, json=arguments.json)
     model, effects = load_model(arguments.model), effects_of(arguments)
     settings = parse_settings(arguments.set) | {"effects": effects}
     recording = read_crash(arguments.bag)
@@ -65,13 +71,11 @@ def simulate(arguments: argparse.Namespace) -> None:
     smooth, said = smoother(recording, arguments.cfc)
     comparisons = compare(structure, description, simulated, smooth)
     origin = f"forces over crush of {other.test.id}" if arguments.source else "its own forces over crush"
-    print(f"{recording.test.id}: free run of {description.model} with {origin}, {description.method}; compared {said}")
-    print()
-    print(characteristic_table(laws))
-    print()
-    print(comparison_table(comparisons))
-    if arguments.json:
+    if arguments.json:  # files before words: `| head` ends this at a line that nobody reads
         write_json(arguments.json, as_json(recording, structure, simulated, laws, comparisons, said))
+    say(f"{recording.test.id}: free run of {description.model} with {origin}, {description.method}; compared {said}\n")
+    say(f"{characteristic_table(laws)}\n")
+    say(comparison_table(comparisons))
 
 
 def smoother(recording: Recording, cfc: int | None):

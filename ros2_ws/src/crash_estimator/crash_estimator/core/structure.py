@@ -17,6 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
+from crash_replay.fault import Fault
 from crash_replay.recording import Test
 
 CONTACT_FREQUENCY = 30.0
@@ -26,7 +27,7 @@ TYPICAL_CRUSH, TYPICAL_RATE = 0.1, 5.0
 """m, m/s: where a higher power is taken to be as large as the first, for its order of magnitude."""
 
 
-class ModelError(ValueError):
+class ModelError(Fault):
     """The model is at fault, or does not fit the test; the message is one readable line."""
 
 

@@ -14,6 +14,8 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_prefix
 
+from crash_replay.output import named
+
 POLITE = 8.0
 """s that a process has to end by itself: the viewer writes its file's end."""
 LOG_HEAD = re.compile(r"^\[(?P<level>\w+)\] \[[\d.]+\] \[[^]]+\]: ")
@@ -73,7 +75,8 @@ class Children:
     """Starts processes and ends all of them, whatever happens: use as a context."""
 
     def __init__(self, logs: Path, environment: Mapping[str, str]):
-        logs.mkdir(parents=True, exist_ok=True)
+        with named(logs):
+            logs.mkdir(parents=True, exist_ok=True)
         self.logs, self.environment = logs, environment
         self.all: dict[str, Child] = {}
 

@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from crash_replay.conditioning import CFC_CLASSES
+from crash_replay.fault import guarded
 from crash_replay.recording import Recording
+from crash_replay.said import Parser
 
-from ..cli.common import guarded
 from ..core.methods import METHODS
 from ..model_file import ready_models
 from .children import Children
@@ -38,12 +39,11 @@ PATIENCE_OF_REPLAY = 600.0
 
 def main() -> int:
     interrupt_on_signals()  # what was started is ended
-    arguments = _parser().parse_args()
-    return guarded(lambda: demo(arguments))
+    return guarded(lambda: demo(_parser().parse_args()))
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def _parser() -> Parser:
+    parser = Parser(
         prog="demo",
         description="Replay a recording, estimate on it, name what the model lacks, add it, show how the error falls.",
     )
@@ -87,7 +87,7 @@ def demo(arguments: argparse.Namespace) -> int:
     cfc = 0 if searches and arguments.cfc is None else arguments.cfc  # a filter would hide what the sensors' noise is
     with claim(arguments.out, source) as out:
         recording, bag, lines = as_bag(source, out, cfc)
-        others = [as_bag(other, out, cfc)[1] for other in arguments.others]
+        others = [as_bag(other, out / f"with_{k}", cfc)[1] for k, other in enumerate(arguments.others, 1)]
         choices = _choices(arguments, source, recording)
         rate = arguments.rate or default_rate(recording.time[-1] - recording.time[0])
         terminal = Terminal()

@@ -7,20 +7,28 @@ from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 
+from crash_replay.output import named
+
 
 @contextmanager
 def claim(out: Path, source: Path) -> Iterator[Path]:
-    """out/NAME, by the recording's name, or out/NAME-2 and so on while another demonstration has it."""
+    """out/NAME, by the recording's name, or out/NAME-2 and so on while another demonstration has it, or where it is the
+    recording itself. Raises OutputError where it cannot be made."""
     name = source.resolve().name if source.is_dir() else source.stem
     for k in count(1):
         folder = out / (name if k == 1 else f"{name}-{k}")
-        folder.mkdir(parents=True, exist_ok=True)
-        mark = os.open(folder, os.O_RDONLY)
+        with named(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            if source.is_dir() and folder.samefile(source):
+                continue
+            mark = os.open(folder, os.O_RDONLY)
         try:
             fcntl.flock(mark, fcntl.LOCK_EX | fcntl.LOCK_NB)  # gone with the process, however that ends
-        except OSError:
+        except BlockingIOError:
             os.close(mark)
             continue
+        except OSError:
+            pass  # a file system without locks: two demonstrations at once are not told apart there
         try:
             yield folder
         finally:

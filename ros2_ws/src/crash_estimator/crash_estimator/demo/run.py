@@ -10,6 +10,7 @@ from rclpy.executors import Executor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from crash_replay.fault import Fault
 from crash_replay.ros_runtime import acknowledge_promptly
 
 from ..core.errors import equation_errors
@@ -218,12 +219,12 @@ class Run:
 
     def _picture(self) -> None:
         """What a viewer would show at the end, where there is no screen for it."""
-        from ..viewer.screenshot import ScreenshotError, screenshot  # takes Rerun, which all else here does without
+        from ..viewer.screenshot import screenshot  # takes Rerun, which all else here does without
 
         picture = self.rrd.with_suffix(".png")
         try:
             screenshot(self.rrd, picture)
-        except ScreenshotError as error:
+        except Fault as error:
             self.terminal.say(f"no picture of it: {error}")
         else:
             self.terminal.say(f"its picture: {near(picture.absolute())}")

@@ -6,6 +6,9 @@ import time
 from pathlib import Path
 from typing import TextIO
 
+from crash_replay.foreign_text import visible, visible_lines
+from crash_replay.said import going_out
+
 REDRAWN_EVERY = 0.1
 """s, on a terminal."""
 SAID_EVERY = 2.0
@@ -25,6 +28,7 @@ class Terminal:
 
     def say(self, text: str = "") -> None:
         """Lines that stay, above the progress line."""
+        text = visible_lines(text)
         self._write(f"{ERASE}{text}\n{self.progress_line}" if self.progress_line else f"{text}\n")
 
     def progress(self, line: str) -> None:
@@ -43,6 +47,7 @@ class Terminal:
         self.waiting = what
 
     def _show(self, line: str) -> None:
+        line = visible(line)
         if self.live:
             self.progress_line = line[: shutil.get_terminal_size().columns - 1]
             self._write(ERASE + self.progress_line)
@@ -52,7 +57,7 @@ class Terminal:
     def end_progress(self, line: str) -> None:
         """The progress line as it shall stay."""
         self.progress_line = ""
-        self._write(f"{ERASE if self.live else ''}{line}\n")
+        self._write(f"{ERASE if self.live else ''}{visible(line)}\n")
 
     def clear(self) -> None:
         """Take the progress line away."""
@@ -61,8 +66,9 @@ class Terminal:
             self._write(ERASE)
 
     def _write(self, text: str) -> None:
-        self.stream.write(text)
-        self.stream.flush()
+        with going_out():
+            self.stream.write(text)
+            self.stream.flush()
 
 
 def near(path: Path | str) -> str:

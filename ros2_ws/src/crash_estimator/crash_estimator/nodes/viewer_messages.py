@@ -3,13 +3,16 @@
 import numpy as np
 from crash_msgs.msg import Event, Forces, Misfit, Parameters, RankedEffect, Ranking, Residuals, TestInfo
 
+from crash_replay.foreign_text import visible
+
 from ..viewer.blocks import EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock
 from ..viewer.findings import Candidate, MisfitBlock, RankingBlock, RevisionBlock, Window
 from .diagnosis_messages import FINAL
 
 
 def test_block(message: TestInfo) -> TestBlock:
-    return TestBlock(message.id, message.title, message.source, int(message.samples), float(message.sample_period))
+    about = map(visible, (message.id, message.title, message.source))
+    return TestBlock(*about, int(message.samples), float(message.sample_period))
 
 
 def parameter_block(estimator: str, message: Parameters) -> ParameterBlock:

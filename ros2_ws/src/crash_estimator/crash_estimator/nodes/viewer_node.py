@@ -19,8 +19,11 @@ from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
+from crash_replay.foreign_text import visible
+from crash_replay.output import check_outputs
 from crash_replay.qos import LATCHED, SAID, STREAM, UNACKNOWLEDGED
 from crash_replay.ros_runtime import run
+from crash_replay.said import say
 
 from ..core.structure import Structure
 from ..model_file import load_model, ready_models
@@ -42,12 +45,13 @@ class ViewerNode(Node):
         # On a busy machine the estimators go first, the picture comes later: this holds for all threads made from here
         # on, Rerun's too, but not for the middleware's, whose acknowledgements the estimators may wait for.
         os.nice(10)
-        say = self.get_logger().info
+        log = self.get_logger().info
         names = self._declared("estimators", [""], "names of estimators; empty: all there are")
         self.estimators = [name for name in names if name]
         models = self._declared("models", [""], "files of models other than the ready ones, for the validation")
         port = self._declared("port", 9876, "of the gRPC server on 127.0.0.1 that viewers connect to")
         rrd = self._declared("rrd", "crash.rrd", "file that the recording is written to; empty: none")
+        check_outputs({"parameter rrd:": rrd or None}, [path for path in models if path])
         memory = self._declared("memory_limit", "1GiB", "what the server keeps for viewers that come late")
         wants_window = self._declared("open", True, "open the native viewer where there is a display")
         self.exits = self._declared("exit_when_finished", False, "end with the replay")
@@ -56,16 +60,16 @@ class ViewerNode(Node):
         warn = self.get_logger().warning
         self.recorder = Recorder(sinks, tuple(self.estimators), say=warn, structure_of=known)
         if sinks.port != port:
-            say(f"port {port} is in use, taking {sinks.port}")
+            log(f"port {port} is in use, taking {sinks.port}")
         self.window: subprocess.Popen | None = None
         self.invitation = f"look at it live with: rerun --connect {sinks.url}"
         if wants_window and has_display():
             self.window = open_viewer(sinks.url)  # the server is up: a window that comes first would not try again
-            say(f"viewer opened on {sinks.url}")
+            log(f"viewer opened on {sinks.url}")
         else:
-            say(self.invitation)
+            log(self.invitation)
         if sinks.rrd:
-            say(f"writing {sinks.rrd}")
+            log(f"writing {visible(sinks.rrd)}")
         self.done = Future()
         self.finished = False
         self.counted: Subscription | None = None
@@ -155,7 +159,7 @@ def main() -> int:
 def close(node: ViewerNode) -> None:
     """Say where what was shown is kept."""
     for line in node.recorder.close():
-        print(line, flush=True)
+        say(line)
 
 
 if __name__ == "__main__":

@@ -3,15 +3,17 @@
 python -m crash_estimator.thesis.evidence [--data FOLDER]      # FOLDER has cyberdiver/ and nhtsa-10146/
 """
 
-import argparse
 import re
+import sys
 import time
 from pathlib import Path
 
 import numpy as np
 
+from crash_replay.fault import guarded
 from crash_replay.readers import read_source
 from crash_replay.recording import Recording
+from crash_replay.said import Parser, say
 from crash_replay.synthetic.recordings import SCENARIOS
 
 from ..core.errors import equation_errors
@@ -102,13 +104,17 @@ def nhtsa(folder: Path) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition(":")[0])
+    sys.exit(guarded(_command))
+
+
+def _command() -> None:
+    parser = Parser(description=__doc__.partition(":")[0])
     parser.add_argument("--data", type=Path, help="folder with cyberdiver/ and nhtsa-10146/")
     folder = parser.parse_args().data
     tables = [forces(), costs()]
     if folder:
         tables += [cyberdiver(folder / "cyberdiver"), nhtsa(folder / "nhtsa-10146")]
-    print("\n\n".join(tables))
+    say("\n\n".join(tables))
 
 
 if __name__ == "__main__":

@@ -1,12 +1,14 @@
 """`thesis --to docs`: run the thesis's simulated experiments again and write docs/thesis.md with its figures."""
 
-import argparse
 import sys
 from pathlib import Path
 
 import numpy as np
 
-from ..cli.common import guarded
+from crash_replay.fault import guarded
+from crash_replay.output import check_outputs, written_into
+from crash_replay.said import Parser, say
+
 from ..core.structure import ModelError
 from ..core.validation import chi_square_quantile
 from ..figures import Line, Panel, draw, markdown_table, write_markdown
@@ -18,18 +20,29 @@ FEWEST_SEEDS, SEEDS = 20, 20
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="thesis", description=__doc__.partition(": ")[2])
+    sys.exit(guarded(_command))
+
+
+def _command() -> None:
+    parser = Parser(prog="thesis", description=__doc__.partition(": ")[2])
     parser.add_argument("--to", default="docs", metavar="DIR", help="folder of thesis.md; figures go to its thesis/")
     parser.add_argument("--seeds", type=int, default=SEEDS, help=f"noisy repetitions, at least {FEWEST_SEEDS}")
     arguments = parser.parse_args()
-    sys.exit(guarded(lambda: write_page(Path(arguments.to), arguments.seeds)))
+    write_page(Path(arguments.to), arguments.seeds)
 
 
 def write_page(folder: Path, seeds: int) -> None:
     if seeds < FEWEST_SEEDS:
         raise ModelError(f"medians over fewer than {FEWEST_SEEDS} seeds say little, got --seeds {seeds}")
-    figures = folder / "thesis"
-    figures.mkdir(parents=True, exist_ok=True)
+    check_outputs({"--to": folder / "thesis.md"}, [])
+    with written_into(folder / "thesis") as figures:
+        page = _page(seeds, figures)
+        count = len(list(figures.iterdir()))
+    path = write_markdown(folder / "thesis.md", page)
+    say(f"{path} and {count} figures in {folder / 'thesis'}")
+
+
+def _page(seeds: int, figures: Path) -> list[str]:
     page = [HEAD.format(seeds=seeds)]
     thesis, of_the_model = (
         [noise_orders(which, seeds, noise=noise) for which in cases.CHAPTER_4]
@@ -50,9 +63,7 @@ def write_page(folder: Path, seeds: int) -> None:
     page += chapter_5(frontal, side, others, figures)
     page += chapter_6(dummy(seeds), dummy(seeds, offsets=True), figures)
     page += rates(sampling(5), figures)
-    page += twins(alike(5))
-    path = write_markdown(folder / "thesis.md", page)
-    print(f"{path} and {len(list(figures.glob('*.png')))} figures in {figures}")
+    return page + twins(alike(5))
 
 
 HEAD = """\

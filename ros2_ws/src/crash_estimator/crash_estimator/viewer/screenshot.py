@@ -1,6 +1,5 @@
 """A picture of a Rerun recording without a screen: python -m crash_estimator.viewer.screenshot run.rrd run.png"""
 
-import argparse
 import os
 import subprocess
 import sys
@@ -8,6 +7,10 @@ import time
 from pathlib import Path
 
 from rerun.experimental import ViewerClient
+
+from crash_replay.fault import Fault, guarded
+from crash_replay.output import check_outputs, write_bytes
+from crash_replay.said import Parser
 
 from .native import viewer_binary
 from .pen import TIMELINE
@@ -20,7 +23,7 @@ LIBRARIES = (
 """Debian packages that drawing without a screen takes."""
 
 
-class ScreenshotError(RuntimeError):
+class ScreenshotError(Fault):
     """The viewer did not start or did not draw; the message is one readable line."""
 
 
@@ -33,9 +36,9 @@ def screenshot(
 ) -> None:
     """Draw a recording as the viewer would show it, the time cursor at `at` s since the impact (None: at the end).
 
-    Raises ScreenshotError where no viewer can run; what it needs is in LIBRARIES.
+    Raises ScreenshotError where no viewer can run; what it needs is in LIBRARIES. OutputError: it cannot be written.
     """
-    rrd, png = Path(rrd).resolve(), Path(png).resolve()
+    rrd, png = Path(rrd).resolve(), Path(png).absolute()
     if not rrd.is_file():
         raise ScreenshotError(f"{rrd}: no such recording")
     port = usable_port(0)
@@ -55,7 +58,7 @@ def screenshot(
             _wait_until_loaded(viewer, time.monotonic() + patience)
             if at is not None:
                 viewer.set_time(TIMELINE, duration=at, play_state="paused")
-            png.write_bytes(_settled_picture(viewer, time.monotonic() + patience))
+            write_bytes(png, _settled_picture(viewer, time.monotonic() + patience))
         except ConnectionError as error:  # it had answered: where it cannot draw it stops a moment later
             raise _stopped(process) from error
         finally:
@@ -105,7 +108,11 @@ def _settled_picture(viewer: ViewerClient, deadline: float) -> bytes:
 
 
 def main(argv: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="screenshot", description="Draw a Rerun recording into a PNG file.")
+    return guarded(lambda: _command(argv))
+
+
+def _command(argv: list[str] | None) -> None:
+    parser = Parser(prog="screenshot", description="Draw a Rerun recording into a PNG file.")
     parser.add_argument("rrd")
     parser.add_argument("png")
     parser.add_argument("--at", type=float, help="time cursor, s since the impact (default: the end)")
@@ -114,12 +121,8 @@ def main(argv: list[str] | None = None) -> int:
     width, _, height = arguments.size.partition("x")
     if not (width.isdigit() and height.isdigit()):
         parser.error(f"--size must be WIDTHxHEIGHT such as 1600x900, got {arguments.size!r}")
-    try:
-        screenshot(arguments.rrd, arguments.png, arguments.at, (int(width), int(height)))
-    except ScreenshotError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    return 0
+    check_outputs({"PNG": arguments.png}, [arguments.rrd])
+    screenshot(arguments.rrd, arguments.png, arguments.at, (int(width), int(height)))
 
 
 if __name__ == "__main__":

@@ -11,7 +11,12 @@ from pathlib import Path
 
 import rerun as rr
 
+from crash_replay.foreign_text import visible
+from crash_replay.output import OutputError, named
+
 APPLICATION = "crash_estimator"
+RERUN = b"RRF"
+"""A Rerun recording begins with it."""
 
 
 class Sinks:
@@ -25,7 +30,8 @@ class Sinks:
         self.memory_limit = memory_limit
         self.started, self.files = 0, 0
         if self.rrd:
-            self.rrd.parent.mkdir(parents=True, exist_ok=True)
+            with named(self.rrd):
+                self.rrd.parent.mkdir(parents=True, exist_ok=True)
 
     def open_live(self) -> rr.RecordingStream:
         recording = _recording()
@@ -37,15 +43,25 @@ class Sinks:
         return recording
 
     def open_file(self) -> tuple[rr.RecordingStream, Path] | None:
-        """None where no file is wanted. Raises OSError where it cannot be written."""
+        """None where no file is wanted. Raises OutputError where it cannot be written."""
         if self.rrd is None:
             return None
         path = self.rrd if not self.files else self.rrd.with_stem(f"{self.rrd.stem}-{self.files + 1}")
-        path.open("wb").close()  # Rerun would say so from another thread and go on without a file
+        with named(path):  # Rerun would say so from another thread and go on without a file
+            _check_replaceable(path)
+            path.open("wb").close()
         recording = _recording()
         recording.set_sinks(rr.FileSink(str(path)))
         self.files += 1
         return recording, path
+
+
+def _check_replaceable(path: Path) -> None:
+    """A bag, or whatever else the replay may read, is not lost by a slip of the hand."""
+    if path.is_file() and path.stat().st_size:
+        with path.open("rb") as file:
+            if file.read(len(RERUN)) != RERUN:
+                raise OutputError(f"{visible(path)} is no Rerun recording and is not replaced: give another name (rrd)")
 
 
 def _recording() -> rr.RecordingStream:

@@ -6,6 +6,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from crash_replay.foreign_text import markdown
+
 from .blocks import ParameterBlock, ResidualBlock
 from .cast import Cast
 from .curves import BAND
@@ -46,22 +48,23 @@ class Summary:
     def text(self, cast: Cast) -> str:
         """Markdown: rows are equations and parameters, columns estimators."""
         names = cast.names
-        lines = [f"**{cast.test.id}** {cast.test.title}", "", _row("", list(names)), "|---|" + "---:|" * len(names)]
-        lines.append(_row("model", [m.model for m in cast.members]))
-        lines.append(_row("method", [m.method for m in cast.members]))
+        lines = [f"**{markdown(cast.test.id)}** {markdown(cast.test.title)}", ""]
+        lines += [row("", list(names)), "|---|" + "---:|" * len(names)]
+        lines.append(row("model", [m.model for m in cast.members]))
+        lines.append(row("method", [m.method for m in cast.members]))
         lines.append(_group("RMS residual", len(names)))
         for body, unit in cast.equations:
             shown = cast.shown(unit)
-            lines.append(_row(f"{body}, {shown.unit}", [self._rms(name, body, shown.factor) for name in names]))
+            lines.append(row(f"{body}, {shown.unit}", [self._rms(name, body, shown.factor) for name in names]))
         lines.append(_group("parameter ± σ", len(names)))
         for parameter, unit in cast.parameters:
             shown = cast.shown(unit)
             cells = [self._parameter(name, parameter, shown.factor) for name in names]
             symbol = parameter.replace(".stiffness", " K").replace(".damping", " C")
-            lines.append(_row(f"{symbol}, {shown.unit}", cells))
+            lines.append(row(f"{symbol}, {shown.unit}", cells))
         lines.append(_group("inside the 99 % band", len(names)))
         for body, _ in cast.equations:
-            lines.append(_row(body, [self._inside(name, body) for name in names]))
+            lines.append(row(body, [self._inside(name, body) for name in names]))
         return "\n".join(lines)
 
     def _rms(self, name: str, body: str, factor: float) -> str:
@@ -87,12 +90,13 @@ def with_std(value: float, std: float) -> str:
     return f"{round(value, digits):.{max(digits, 0)}f} ± {round(std, digits):.{max(digits, 0)}f}"
 
 
-def _row(title: str, cells: list[str]) -> str:
-    return f"| {title} | " + " | ".join(cells) + " |"
+def row(title: str, cells: list[str]) -> str:
+    """Of a Markdown table; what is in it has no markup."""
+    return f"| {markdown(title)} | " + " | ".join(map(markdown, cells)) + " |"
 
 
 def _group(title: str, columns: int) -> str:
-    return _row(f"**{title}**", [""] * columns)
+    return f"| **{title}** |" + " |" * columns
 
 
 def summary_view() -> rrb.View:

@@ -6,6 +6,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from crash_replay.foreign_text import markdown
+
 from ..core.validation import LEVELS, Correlation, EquationValidation
 from ..validation_tables import strongest_input
 from .axes import Axis
@@ -14,6 +16,7 @@ from .drawing import Drawing, Frame, view
 from .judged import Judged
 from .loops import INK
 from .pen import TIMELINE, Pen, path
+from .summary import row
 
 LIMIT_COLORS: tuple[Color, ...] = ((120, 120, 70), (245, 220, 70), (235, 110, 80))
 """Of the 90, 95 and 99 % limits."""
@@ -44,28 +47,28 @@ def tables(cast: Cast, name: str, one: Judged) -> str:
     errors, equations = one.validation.errors, one.validation.equations
     shown = [cast.shown(e.unit) for e in errors]
     runs = {c.name: c for c in one.comparisons}
-    lines = [f"**{cast.label(name)}**: what is left over after the impact", ""]
-    lines += [_row("", [f"{e.equation}, {s.unit}" for e, s in zip(errors, shown)]), "|---|" + "---:|" * len(errors)]
+    lines = [f"**{markdown(cast.label(name))}**: what is left over after the impact", ""]
+    lines += [row("", [f"{e.equation}, {s.unit}" for e, s in zip(errors, shown)]), "|---|" + "---:|" * len(errors)]
     for title, mean, variance in (
         ("measured", "input_mean", "input_variance"),
         ("predicted", "output_mean", "output_variance"),
         ("error", "error_mean", "error_variance"),
     ):
         cells = [(s.factor * getattr(e, mean), s.factor**2 * getattr(e, variance)) for e, s in zip(errors, shown)]
-        lines.append(_row(f"{title}: mean, variance", [f"{m:.3g}, {v:.3g}" for m, v in cells]))
+        lines.append(row(f"{title}: mean, variance", [f"{m:.3g}, {v:.3g}" for m, v in cells]))
     for level in LEVELS:
         inside = [f"{e.auto.inside(level):.0%}" if e.auto else "–" for e in equations]
-        lines.append(_row(f"auto-correlation: lags within {level:.0%} limits", inside))
-    lines.append(_row("white (Ljung and Box)", [_white(e) for e in equations]))
-    lines.append(_row("most alike / its 99 % limit", [_alike(e) for e in equations]))
+        lines.append(row(f"auto-correlation: lags within {level:.0%} limits", inside))
+    lines.append(row("white (Ljung and Box)", [_white(e) for e in equations]))
+    lines.append(row("most alike / its 99 % limit", [_alike(e) for e in equations]))
     ratings = [runs[e.equation].rating if e.equation in runs else None for e in errors]
-    lines.append(_row("simulated freely: ISO/TS 18571", [f"{r.overall:.2f} {r.grade}" if r else "–" for r in ratings]))
+    lines.append(row("simulated freely: ISO/TS 18571", [f"{r.overall:.2f} {r.grade}" if r else "–" for r in ratings]))
     lines += ["", "**covariance of the error** (correlation)", ""]
-    lines += [_row("", [e.equation for e in errors]), "|---|" + "---:|" * len(errors)]
+    lines += [row("", [e.equation for e in errors]), "|---|" + "---:|" * len(errors)]
     factors = np.array([s.factor for s in shown])
     covariance = one.validation.covariance * np.outer(factors, factors)
-    for e, row, correlation in zip(errors, covariance, one.validation.correlation):
-        lines.append(_row(e.equation, [f"{v:.3g} ({r:+.2f})" for v, r in zip(row, correlation)]))
+    for e, values, correlation in zip(errors, covariance, one.validation.correlation):
+        lines.append(row(e.equation, [f"{v:.3g} ({r:+.2f})" for v, r in zip(values, correlation)]))
     return "\n".join(lines)
 
 
@@ -76,10 +79,6 @@ def _white(equation: EquationValidation) -> str:
 def _alike(equation: EquationValidation) -> str:
     name, share = strongest_input(equation.cross)
     return f"{name}: {share:.1f}" if equation.cross else "–"
-
-
-def _row(title: str, cells: list[str]) -> str:
-    return f"| {title} | " + " | ".join(cells) + " |"
 
 
 def correlation_drawing(cast: Cast, found: Mapping[str, Correlation]) -> Drawing:

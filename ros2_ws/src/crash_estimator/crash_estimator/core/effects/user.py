@@ -23,7 +23,7 @@ def load_effects(path: str | Path) -> dict[str, Effect]:
     """
     try:
         content = runpy.run_path(str(path))
-    except Exception as error:  # whatever a user's file may raise
+    except (Exception, SystemExit) as error:  # whatever a user's file may raise
         raise ModelError(f"{path}: {type(error).__name__}: {error}") from None
     found = {value.name: value for value in content.values() if isinstance(value, Effect)}
     if not found:
@@ -52,7 +52,7 @@ def _try_out(path: str | Path, effect: Effect) -> None:
     try:
         with np.errstate(all="ignore"):
             values = np.asarray(getattr(effect, function)(argument, **shapes), dtype=float)
-    except Exception as error:  # whatever a user's function may raise
+    except (Exception, SystemExit) as error:  # whatever a user's function may raise
         raise ModelError(f"{where} fails on a motion it was tried on: {type(error).__name__}: {error}") from None
     if values.shape not in ((), time.shape):
         raise ModelError(f"{where} must give one number for each of the {INSTANTS} instants, it gives {values.shape}")

@@ -1,0 +1,147 @@
+"""How a program ends: with its exit status, and one line on standard error where something is at fault.
+
+Nothing that is raised, whatever it is, reaches the user as a traceback: CRASH_TRACEBACK=1 in the environment shows it.
+"""
+
+import os
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from .foreign_text import visible
+
+DONE, AT_FAULT = 0, 1
+INTERRUPTED, NOBODY_READS = 128 + signal.SIGINT, 128 + signal.SIGPIPE
+"""As a shell reports a program that a signal has ended."""
+ENDING = (signal.SIGTERM, signal.SIGHUP)
+
+TRACEBACK = "CRASH_TRACEBACK"
+LONGEST = 500
+"""Characters of an exception's text that are worth reading."""
+
+
+class Fault(ValueError):
+    """Data, a model, a file or what was asked for is at fault; the message is one readable line, in a log too."""
+
+    def __str__(self) -> str:
+        return one_line(super().__str__())
+
+
+class NobodyReads(Exception):
+    """What is printed goes into a pipe whose reader has gone, as of `| head`."""
+
+
+class Ended(BaseException):
+    """By a signal: what was begun is cleared away."""
+
+
+class Usage(SystemExit):
+    """The command line is at fault, or `--help` was asked for: all has been said."""
+
+
+def guarded(command: Callable[[], int | None], also: tuple[type[Exception], ...] = ()) -> int:
+    """Run a command -> its exit status: what it says, 0 for nothing, 1 where something is at fault.
+
+    also: exceptions that are no fault of the program either, with a message that can be read.
+    """
+    try:
+        with _signals_end_it(), _threads_complain() as failed:
+            return command() or (AT_FAULT if failed else DONE)
+    except Usage:
+        raise
+    except Ended as ended:
+        return 128 + ended.args[0]
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except NobodyReads:
+        return NOBODY_READS
+    except (Fault, *also) as error:
+        line = str(error)
+    except OSError as error:
+        line = _of_the_system(error)
+    except BaseException as error:  # a user's effect may call sys.exit: that is not how a command ends
+        line = of_the_program(error)
+    complain(line)
+    return AT_FAULT
+
+
+@contextmanager
+def _signals_end_it() -> Iterator[None]:
+    """Like Ctrl-C, unless they are dealt with already: a file that is half written would stay."""
+    ours = threading.current_thread() is threading.main_thread()
+    default = [number for number in ENDING if ours and signal.getsignal(number) is signal.SIG_DFL]
+
+    def end(number: int, _) -> None:
+        raise Ended(number)
+
+    for number in default:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in default:
+            signal.signal(number, signal.SIG_DFL)
+
+
+@contextmanager
+def _threads_complain() -> Iterator[list[BaseException]]:
+    """What ends a thread is said in a line too, and remembered."""
+    failed: list[BaseException] = []
+
+    def remember(of: threading.ExceptHookArgs) -> None:
+        failed.append(of.exc_value)
+        complain(of_the_program(of.exc_value))
+
+    before, threading.excepthook = threading.excepthook, remember
+    try:
+        yield failed
+    finally:
+        threading.excepthook = before
+
+
+def complain(line: str) -> None:
+    """What is at fault."""
+    tell(f"error: {line}")
+
+
+def tell(line: str) -> None:
+    """One line on standard error; nothing where there is nobody to read it."""
+    with suppress(OSError, ValueError, AttributeError):
+        print(one_line(line), file=sys.stderr, flush=True)
+
+
+def one_line(text: str) -> str:
+    """Line ends as spaces, and whatever else does not print as it can be seen."""
+    return text if text.isprintable() else visible(" ".join(text.split()))
+
+
+def of_the_program(error: BaseException) -> str:
+    """What failed and where, and how to see more of it."""
+    if os.environ.get(TRACEBACK):
+        traceback.print_exception(error)
+    what = one_line(f"{type(error).__name__}: {error}" if str(error) else type(error).__name__)
+    what = what if len(what) <= LONGEST else f"{what[:LONGEST]} ..."
+    return f"a fault of the program: {what} (at {_where(error)}; {TRACEBACK}=1 shows the traceback)"
+
+
+def _of_the_system(error: OSError) -> str:
+    if error.errno is None:
+        return str(error)  # of ours, in words
+    return f"{error.filename}: {error.strerror}" if error.filename is not None else of_the_program(error)
+
+
+def _where(error: BaseException) -> str:
+    """File and line of the innermost call in this project or in a file of the user's."""
+    calls, step = [], error.__traceback__
+    while step:
+        calls.append((step.tb_frame.f_globals.get("__name__", ""), step.tb_frame.f_code.co_filename, step.tb_lineno))
+        step = step.tb_next
+    ours = [call for call in calls if call[0].startswith(("crash_", "<run_path>", "__main__")) and call[0] != __name__]
+    if not calls:
+        return "an unknown place"
+    _, file, line = (ours or calls)[-1]
+    return f"{'/'.join(Path(file).parts[-2:])}:{line}"
