@@ -7,7 +7,7 @@ import pytest
 from helpers_diagnosis import hidden_case, so_far
 
 from crash_estimator.core.structure import EffectSpec
-from crash_estimator.nodes.diagnosis_worker import Task, Worker
+from crash_estimator.nodes.diagnosis_worker import DEATHS, Task, Worker, WorkerError
 
 
 @pytest.fixture(scope="module")
@@ -37,14 +37,25 @@ def test_a_process_answers_with_the_users_effects_and_is_replaced_where_it_ends(
         assert {"stick", "viscous_damping"} <= names
         worker.ask(Task(model, so_far(recording, 0.03), final=False))
         worker.process.kill()
-        assert "ended with status -9, a new one is started" in _reply(worker).error
-        assert _reply(worker, ready=True) is None
+        assert _reply(worker).answer is not None, "a new one is asked the same"
         wrong = replace(model, effects=(EffectSpec("viscous_damping", "nowhere"),))
         worker.ask(Task(wrong, so_far(recording, 0.03), final=False))
         assert "'nowhere'" in _reply(worker).error
         worker.ask(Task(model, recording, final=True))
         worker.drop()
         assert _reply(worker, ready=True) is None, "nobody waits for that answer: it never comes"
+    finally:
+        worker.close()
+
+
+def test_a_process_that_ends_again_and_again_is_given_up(damped):
+    worker = Worker(damped[1])
+    try:
+        with pytest.raises(WorkerError, match=f"ended {DEATHS + 1} times, at last with status -9"):
+            while True:
+                worker.process.kill()
+                worker.process.wait()
+                worker.reply()
     finally:
         worker.close()
 

@@ -59,6 +59,13 @@ class Attending:
         self.own = self.own._replace(**self.progress()._asdict())
         self.out.publish(Message(**self.own._asdict()))
 
+    def _why_the_rest_has_not_come(self) -> str:
+        for name in self.others.names(REPLAY):
+            state = self.others.state(name)
+            if state in (State.LEFT, State.KILLED, State.SILENT):
+                return f"the replay {self.others.how(name, state)}"
+        return "ended before the rest came"
+
     def _look(self) -> None:
         self.tell()
         self._bury_killed()
@@ -81,7 +88,9 @@ class Attending:
         self.out.wait_for_all_acked(HEARD)  # what is left unsaid makes others think that it was killed
         if not own.total or (own.done and not (own.missing or own.reason)):
             return ""
-        why = own.reason or "ended before the rest came"
+        why = own.reason or self._why_the_rest_has_not_come()
+        if own.next >= own.total and not own.missing:
+            return f"incomplete: no last word on all {own.total} samples ({why})"
         return f"incomplete: {own.next - own.missing} of {own.total} samples ({why})"
 
     def _on_word(self, message: Message) -> None:

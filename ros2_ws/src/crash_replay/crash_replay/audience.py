@@ -37,7 +37,11 @@ class Audience:
     def not_ready(self, names: Sequence[str]) -> list[str]:
         """Nodes of these whose subscription to `samples` is not found, or who have not said that they are ready."""
         ready = {name for name in self._found() if self.words.state(name) in (State.FOLLOWING, State.COMPLETE)}
-        return [name for name in names if self._full_name(name) not in ready]
+        return [self._with_reason(name) for name in names if self._full_name(name) not in ready]
+
+    def _with_reason(self, name: str) -> str:
+        known = self._full_name(name) if self.words.word(self._full_name(name)) else ""
+        return f"{name} ({self.words.how(known, self.words.state(known))})" if known else f"{name} (not heard of)"
 
     def forget_gone(self) -> None:
         """Who has gone before the first sample takes no part."""

@@ -12,6 +12,7 @@ from crash_msgs.msg import Samples, TestInfo
 from crash_msgs.srv import AddEffect, RemoveEffect
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
+from rclpy.task import Future
 
 from crash_replay.attending import Attending, Progress
 from crash_replay.bag import read_bag
@@ -70,6 +71,7 @@ class DiagnosisNode(Node):
         self.stopped = ""  # why nothing can be said
         self.cannot_be_had = ""  # why, of what was missed in this pass
         self.at_fault = ""  # why nothing is diagnosed on this test
+        self.done = Future()  # when nothing more can be diagnosed
         self.prepared = False  # its process has compiled its code
         self.rest_of = 0  # the pass that what has not come is asked of
         self.finals: dict[tuple[int, int], LiveAnswer] = {}  # by revision and samples missing
@@ -188,7 +190,12 @@ class DiagnosisNode(Node):
         if not (self.prepared or self.worker.busy):
             self.prepared = True
             self.attending.tell()
-        reply = self.worker.reply()
+        try:
+            reply = self.worker.reply()
+        except WorkerError as error:
+            self.at_fault, self.kept = str(error), None
+            self.done.set_result(None)
+            return
         if reply is not None and reply.error:
             self.stopped = reply.error
             self.get_logger().error(f"{reply.error}; no more is said until the test, the pass or the model changes")
@@ -277,8 +284,13 @@ class DiagnosisNode(Node):
 
 
 def main() -> int:
-    at_fault = (ModelError, RecordingError, WorkerError)
-    return run(DiagnosisNode, at_fault, close=lambda node: node.attending.leave())
+    return run(DiagnosisNode, (ModelError, RecordingError), until=lambda node: node.done, close=close)
+
+
+def close(node: DiagnosisNode) -> str:
+    """A line on what its answers lack, or ""."""
+    lacks = node.attending.leave()
+    return f"error: {node.at_fault}" if node.done.done() and node.at_fault else lacks
 
 
 if __name__ == "__main__":

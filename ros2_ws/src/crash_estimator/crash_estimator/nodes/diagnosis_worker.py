@@ -69,8 +69,12 @@ class Answerer:
             self.answer(Task(structure, recording, final=False))
 
 
+DEATHS = 3
+"""Times that the process may end by itself, in all, before no other one is started: a killed one is not its own fault."""
+
+
 class WorkerError(RuntimeError):
-    """The process cannot even begin; the message is one line."""
+    """The process ends again and again; the message is one line."""
 
 
 class Reply(NamedTuple):
@@ -84,11 +88,14 @@ class Worker:
     def __init__(self, structure: Structure, effects_file: str = "", bags: Sequence[str] = ()):
         """structure: to get ready with; effects_file: a user's own; bags: other recordings of the same structure."""
         self.setup = structure, effects_file, tuple(bags)
+        self.deaths = 0
+        self.task: Task | None = None  # the last one
+        self.to_ask_again: Task | None = None  # one that died with its process, till the new one is there
         self._start()
 
     def ask(self, task: Task) -> None:
         """Only while it is not busy: then it takes the task from the pipe as fast as it is put there."""
-        self.busy, self.wanted, self.long = True, True, task.final
+        self.busy, self.wanted, self.long, self.task = True, True, task.final, task
         self._pipe.send(task)
 
     def reply(self) -> Reply | None:
@@ -99,12 +106,16 @@ class Worker:
             content = self._pipe.recv()
         except (EOFError, OSError):
             return self._ended()
-        wanted, self.busy, self.wanted, self.ready = self.wanted, False, False, True
+        wanted, self.busy, self.wanted = self.wanted, False, False
+        again, self.to_ask_again = self.to_ask_again, None
+        if again:
+            self.ask(again)
+            return None
         return content if wanted else None
 
     def drop(self) -> None:
         """Nobody waits for the reply any more: an update is let finish, a final answer, which takes seconds, is not."""
-        self.wanted = False
+        self.wanted, self.to_ask_again = False, None
         if self.busy and self.long:
             self.close()
             self._start()
@@ -114,13 +125,17 @@ class Worker:
         self.process.wait()
         self._pipe.close()
 
-    def _ended(self) -> Reply:
+    def _ended(self) -> Reply | None:
+        """The process is gone: another one is asked the same. Raises WorkerError where that has happened too often."""
         status = self.process.wait()
         self._pipe.close()
-        if not self.ready:
-            raise WorkerError(f"the process of the diagnosis could not begin, its status is {status}")
+        self.deaths += 1
+        if self.deaths > DEATHS:
+            raise WorkerError(f"the process of the diagnosis ended {self.deaths} times, at last with status {status}")
+        again = (self.task if self.wanted else None) or self.to_ask_again
         self._start()
-        return Reply(None, f"the process of the diagnosis ended with status {status}, a new one is started")
+        self.to_ask_again = again
+        return None
 
     def _start(self) -> None:
         self._pipe, its = Pipe()
@@ -130,7 +145,6 @@ class Worker:
         its.close()
         self._pipe.send(self.setup)
         self.busy, self.wanted, self.long = True, False, False  # until it says that it is there
-        self.ready = False
 
 
 def main(fd: int) -> None:
