@@ -10,7 +10,7 @@ import pytest
 from helpers_replay import Listener, Replay, environment, some_recording, wait_until
 
 from crash_replay.bag import write_bag
-from crash_replay.ros_runtime import PROFILES_VARIABLE
+from crash_replay.middleware import PROFILES, RANGE
 from crash_replay.subscribers import is_gone, running
 
 
@@ -56,7 +56,7 @@ def test_one_that_is_killed_is_named_and_not_waited_for_until_its_lease_ends(bag
 
 def test_one_that_is_killed_counts_for_none_that_is_still_to_come(bag, listener):
     """Long before its lease, 20 s without our profiles, has ended."""
-    variables = {k: v for k, v in environment().items() if k != PROFILES_VARIABLE}
+    variables = {k: v for k, v in environment().items() if k != PROFILES} | {RANGE: "LOCALHOST"}
     mortal = subprocess.Popen([sys.executable, "-c", MORTAL], env=variables)
 
     try:

@@ -21,11 +21,12 @@ from std_srvs.srv import Trigger
 from .bag import read_bag
 from .console import Console, wanted
 from .fault import guarded, tell
+from .middleware import prepare_middleware
 from .pacing import Outcome, Pacing
 from .player import SECOND, CommandError, Player
 from .replay_parameters import LIVE, ParameterError, checked, declare_parameters, names_in, window_of
 from .replay_topics import ReplayTopics
-from .ros_runtime import acknowledge_promptly, spin
+from .ros_runtime import spin
 from .said import say
 from .samples_again import serve_samples
 from .selection import SelectionError, samples_within, select_channels
@@ -134,7 +135,7 @@ def main() -> int:
 
 
 def _main() -> int:
-    acknowledge_promptly()
+    prepare_middleware()
     # Ctrl-C must end the replay between two messages, not take the context away under it.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
