@@ -10,55 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from ament_index_python.packages import get_package_prefix
-from helpers_domain import own_domain
+from helpers_nodes import BAG, MODULES, environment, executable, family, node, parameters
 from helpers_waiting import PATIENCE
 
-BAG = Path(__file__).resolve().parent.parent / "bags" / "frontal_single.mcap"
-MODEL = "model:=frontal_single"
-MODULES = {
-    "replay": "crash_replay.replay_node",
-    "record": "crash_replay.record_node",
-    "estimator": "crash_estimator.nodes.estimator_node",
-    "diagnosis": "crash_estimator.nodes.diagnosis_node",
-    "viewer": "crash_estimator.nodes.viewer_node",
-}
-ABOUT_THE_NETWORK = (
-    "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER",
-    "FASTRTPS_DEFAULT_PROFILES_FILE",
-)  # fmt: skip
 PORTS_OF_A_NODE = 4  # UDP: discovery, data, another one of Fast DDS, and the one that it sends from
-
-
-def environment(**given: str) -> dict[str, str]:
-    """Of somebody who has set nothing about the network, on a ROS domain of the test's own."""
-    kept = {k: v for k, v in os.environ.items() if k not in (*ABOUT_THE_NETWORK, "DISPLAY", "WAYLAND_DISPLAY")}
-    return kept | {"ROS_DOMAIN_ID": str(own_domain())} | given
-
-
-def parameters(name: str, folder: Path) -> list[str]:
-    of = {
-        "replay": [f"bag:={BAG}", "wait_for:=9", f"wait_timeout:={PATIENCE}"],
-        "record": [f"to:={folder / 'new.mcap'}"],
-        "estimator": [MODEL],
-        "diagnosis": [MODEL],
-        "viewer": [f"rrd:={folder / 'new.rrd'}", "port:=0"],
-    }
-    return ["--ros-args", *(word for parameter in of[name] for word in ("-p", parameter))]
-
-
-def executable(package: str, name: str) -> list[str]:
-    """As `ros2 run` starts it."""
-    return [sys.executable, str(Path(get_package_prefix(package)) / "lib" / package / name)]
-
-
-def family(process: int) -> list[int]:
-    """A process and those that it has started, and they."""
-    try:
-        threads = [(thread / "children").read_text() for thread in Path(f"/proc/{process}/task").iterdir()]
-    except OSError:
-        return [process]  # it has ended
-    return [process, *(one for children in threads for child in children.split() for one in family(int(child)))]
 
 
 def bound(process: int) -> set[tuple[str, str, int]]:
@@ -122,9 +77,7 @@ def a_viewer(sockets: set) -> bool:
 
 @pytest.mark.parametrize("name", MODULES)
 def test_a_node_listens_on_this_machine_only(name, tmp_path):
-    command = executable(MODULES[name].split(".")[0], name) + parameters(name, tmp_path)
-    enough = a_viewer if name == "viewer" else a_node
-    seen = watched(command, environment(), enough)
+    seen = watched(node(name, tmp_path), environment(), a_viewer if name == "viewer" else a_node)
     assert not elsewhere(seen), seen
 
 
@@ -145,8 +98,7 @@ def test_the_demonstration_and_all_that_it_starts_listen_on_this_machine_only(tm
 
 @pytest.mark.parametrize("opened", [{"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, {"ROS_STATIC_PEERS": "192.0.2.1"}])
 def test_it_listens_elsewhere_where_it_is_told_to(opened, tmp_path):
-    command = executable("crash_replay", "replay") + parameters("replay", tmp_path)
-    seen = watched(command, environment(**opened), lambda sockets: bool(elsewhere(sockets)))
+    seen = watched(node("replay", tmp_path), environment(**opened), lambda sockets: bool(elsewhere(sockets)))
     assert {address for _, address, _ in elsewhere(seen)} >= {"0.0.0.0"}, seen
 
 

@@ -23,7 +23,7 @@ LAST_ACKNOWLEDGEMENT = 30.0
 """Seconds at the end for subscribers to take what has been sent; half a second where a signal has ended the replay."""
 
 
-WAITING = 0.02
+WAITING = 0.1
 """Seconds between two looks at who has come, or is through."""
 SAY_AFTER, SAY_AGAIN = 2.0, 30.0
 """Seconds at the end after which it is said who is waited for, and between two such lines."""
