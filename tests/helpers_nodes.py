@@ -1,7 +1,9 @@
 """The nodes as a user starts them, each in a process of its own, waiting for what never comes."""
 
 import os
+import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from ament_index_python.packages import get_package_prefix
@@ -49,6 +51,18 @@ def node(name: str, folder: Path) -> list[str]:
 def executable(package: str, name: str) -> list[str]:
     """As `ros2 run` starts it."""
     return [sys.executable, str(Path(get_package_prefix(package)) / "lib" / package / name)]
+
+
+def end(processes: Sequence[subprocess.Popen]) -> None:
+    """A node that compiles takes no signal till it is through, so that they may have to be killed."""
+    for process in processes:
+        process.terminate()
+    for process in processes:
+        try:
+            process.communicate(timeout=PATIENCE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.communicate()
 
 
 def family(process: int) -> list[int]:

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 import pytest
-from helpers_nodes import MODULES, environment, family, node
+from helpers_nodes import MODULES, end, environment, family, node
 from helpers_waiting import PATIENCE
 
 SHARE = 0.1
@@ -45,9 +45,6 @@ def test_nodes_that_wait_take_next_to_nothing(tmp_path):
                 took = processor_time(process.pid) - before[name]
                 shares[name] = [*shares[name], took / (time.monotonic() - began)]
     finally:
-        for process in nodes.values():
-            process.terminate()
-        for process in nodes.values():
-            process.communicate(timeout=PATIENCE)
+        end(list(nodes.values()))
     least = {name: min(of) for name, of in shares.items()}
     assert least == pytest.approx(dict.fromkeys(nodes, 0.0), abs=SHARE)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from helpers_nodes import BAG, MODULES, environment, executable, family, node, parameters
+from helpers_nodes import BAG, MODULES, end, environment, executable, family, node, parameters
 from helpers_waiting import PATIENCE
 
 PORTS_OF_A_NODE = 4  # UDP: discovery, data, another one of Fast DDS, and the one that it sends from
@@ -59,11 +59,7 @@ def watched(command: list[str], given: dict[str, str], enough: Callable, seconds
                 last = time.monotonic() + seconds
             time.sleep(0.05)
     finally:
-        process.terminate()
-        try:
-            process.communicate(timeout=PATIENCE)
-        finally:
-            process.kill()
+        end([process])
     return seen
 
 

@@ -4,6 +4,7 @@ import math
 import signal
 import sys
 from collections.abc import Callable
+from functools import partial
 from threading import Thread
 from typing import Any
 
@@ -21,9 +22,11 @@ from std_srvs.srv import Trigger
 from .bag import read_bag
 from .console import Console, wanted
 from .fault import guarded, tell
+from .health import HealthReport
 from .middleware import prepare_middleware
 from .pacing import Outcome, Pacing
 from .player import SECOND, CommandError, Player
+from .replay_health import replay_health
 from .replay_parameters import LIVE, ParameterError, checked, declare_parameters, names_in, window_of
 from .replay_topics import ReplayTopics
 from .ros_runtime import spin
@@ -51,6 +54,7 @@ class ReplayNode(Node):
         self.create_service(SetRate, "~/set_rate", self._on_set_rate)
         self.create_service(Burst, "~/burst", self._on_burst)
         serve_samples(self, recording)
+        HealthReport(self, "pace", partial(replay_health, self.pacing, topics.audience))
         self.add_on_set_parameters_callback(self._on_parameters)
 
     def replay(self) -> Outcome:
