@@ -13,7 +13,7 @@ PYTEST = PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 tools/env python -m pytest -p _hypothe
 test: # all tests; some of them with PYTEST_ARGS="-k name"
 	@tools/setup
 	@tools/screenshot-libs
-	@tools/env python -m crash_estimator.core.compiled.warm_up
+	@tools/env python -m crash_estimator.warm_up
 	@$(PYTEST) -n 2 --dist loadfile $(PYTEST_ARGS)
 
 bags: # the simulated recordings in bags/, made anew

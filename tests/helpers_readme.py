@@ -15,7 +15,7 @@ COMMANDS = [line for block in re.findall(r"```sh\n(.*?)```", README, re.S) for l
 def environment() -> dict[str, str]:
     """Of a new user without a display, on a ROS domain of the test's own."""
     kept = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", "MAKEFLAGS", "MAKELEVEL")}
-    return kept | {"ROS_DOMAIN_ID": str(own_domain()), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    return kept | {"ROS_DOMAIN_ID": str(own_domain())}
 
 
 def needs_data(command: str) -> None:

@@ -17,10 +17,11 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 
+from crash_replay.middleware import prepare_middleware
 from crash_replay.qos import EVERY_SAMPLE, LATCHED
 from crash_replay.recording import Channel, Recording, Test
 from crash_replay.ros_messages import samples_from_msg
-from crash_replay.ros_runtime import acknowledge_promptly, spin
+from crash_replay.ros_runtime import spin
 
 DOMAIN = own_domain()
 """Other tests, and other people's nodes, must not hear us: each test process has a domain."""
@@ -43,7 +44,7 @@ def some_recording(n: int = 40, period_ns: int = 1_000_000, before: int = 10, se
 
 
 def environment() -> dict[str, str]:
-    return {**os.environ, "ROS_DOMAIN_ID": str(DOMAIN), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    return {**os.environ, "ROS_DOMAIN_ID": str(DOMAIN)}
 
 
 class Replay:
@@ -79,8 +80,7 @@ class Listener:
     """Hears the replay's `test`, `samples` and `replay_state`; takes nothing for `stall` s after the first sample."""
 
     def __init__(self, name: str = "listener", stall: float = 0.0):
-        acknowledge_promptly()
-        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        prepare_middleware()
         self.context = Context()
         rclpy.init(context=self.context, domain_id=DOMAIN)
         self.node = Node(name, context=self.context, start_parameter_services=False)

@@ -132,7 +132,7 @@ def test_every_command_ends_with_a_line(command, step, arguments, monkeypatch, c
 def test_every_node_ends_with_a_line(monkeypatch, capsys):
     for module, main in ((ros_runtime, lambda: ros_runtime.run(raising(RuntimeError("broken")), ())),
                          (replay_node, replay_node.main)):  # fmt: skip
-        monkeypatch.setattr(module, "acknowledge_promptly", raising(RuntimeError("broken")))
+        monkeypatch.setattr(module, "prepare_middleware", raising(RuntimeError("broken")))
         assert main() == 1
         assert capsys.readouterr().err.startswith("error: a fault of the program: RuntimeError: broken (at ")
 

@@ -13,8 +13,8 @@ from crash_replay.subscribers import process_of
 MORTAL = """
 import rclpy
 from crash_msgs.msg import Samples
-from crash_replay.ros_runtime import acknowledge_promptly
-acknowledge_promptly()
+from crash_replay.middleware import prepare_middleware
+prepare_middleware()
 rclpy.init()
 node = rclpy.create_node("mortal")
 node.create_subscription(Samples, "samples", lambda message: None, 10)

@@ -54,7 +54,7 @@ class Outlet:
     def send(self, batch):
         self.batches.append((time.perf_counter(), batch))
 
-    def send_state(self, player, tally, block):
+    def send_state(self, player, tally, block, rate):
         self.states.append((player.mode, player.next))
 
     def has_room(self, now, on_time):

@@ -276,6 +276,32 @@ def test_the_tally_knows_the_rate_and_the_worst_lateness():
     assert_allclose(tally.worst_lateness, 1e-3, rtol=1e-9)
 
 
+def test_the_present_rate_is_that_of_the_last_second_of_playing():
+    anchor, tally = Anchor(0.0, 0), Tally()
+    for k in range(500):  # 5 s at the rate 1, then 5 s at a fifth of it
+        tally.count(Batch(k, k + 1, 0, 0.01 * k, anchor), 10 * k * MS, 0.01 * k)
+    assert_allclose(tally.rate_now(), 1.0)
+    for k in range(500, 600):
+        tally.count(Batch(k, k + 1, 0, 0.01 * k, anchor), 10 * k * MS, 4.99 + 0.05 * (k - 499))
+    assert_allclose(tally.rate_now(), 0.2)
+    assert_allclose(tally.rate, 0.6, rtol=0.01)  # of all
+    assert_allclose(tally.rate_now(late=1.0), 0.1, rtol=0.05)  # a subscriber holds it up
+
+
+def test_the_present_rate_is_known_where_less_than_one_message_is_sent_in_a_second():
+    anchor, tally = Anchor(0.0, 0), Tally()
+    for k in range(4):
+        tally.count(Batch(k, k + 1, 0, 3.0 * k, anchor), 3 * k * MS, 3.0 * k)
+    assert_allclose(tally.rate_now(), 0.001)
+
+
+def test_late_is_what_is_due_and_has_not_been_sent():
+    player = Player(TEN).resume(100.0)
+    assert player.late(99.0) == 0.0
+    assert_allclose(player.late(100.5), 0.5)
+    assert player.pause(100.5).late(101.0) == 0.0
+
+
 def test_a_loop_that_is_late_counts_its_lateness_once():
     """20 passes of 10 ms, each taking 20 ms."""
     tally, player = Tally(), Player(TEN, loop=True).resume(0.0)

@@ -5,13 +5,15 @@ import subprocess
 import sys
 import time
 from functools import partial
+from pathlib import Path
 
 import pytest
 from helpers_replay import Listener, Replay, environment, some_recording, wait_until
 
+from crash_replay import subscribers
 from crash_replay.bag import write_bag
-from crash_replay.ros_runtime import PROFILES_VARIABLE
-from crash_replay.subscribers import is_gone, running
+from crash_replay.middleware import PROFILES, RANGE
+from crash_replay.subscribers import PROCESS, is_gone, running
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +58,7 @@ def test_one_that_is_killed_is_named_and_not_waited_for_until_its_lease_ends(bag
 
 def test_one_that_is_killed_counts_for_none_that_is_still_to_come(bag, listener):
     """Long before its lease, 20 s without our profiles, has ended."""
-    variables = {k: v for k, v in environment().items() if k != PROFILES_VARIABLE}
+    variables = {k: v for k, v in environment().items() if k != PROFILES} | {RANGE: "LOCALHOST"}
     mortal = subprocess.Popen([sys.executable, "-c", MORTAL], env=variables)
 
     try:
@@ -70,17 +72,22 @@ def test_one_that_is_killed_counts_for_none_that_is_still_to_come(bag, listener)
         mortal.wait()
 
 
-def test_whether_a_process_is_gone_is_known_of_this_machine_only():
+def test_whether_a_process_is_gone_is_known_of_this_machine_only(monkeypatch):
     """Participants as Fast DDS numbers them: its maker, the machine, the process, and which one in it."""
 
     def participant(host: bytes, process: int) -> bytes:
         return bytes([1, 15]) + host + (process & 0xFFFF).to_bytes(2, "little") + bytes(6)
 
+    def gone(host: bytes, process: int, own: int) -> bool:
+        one = participant(host, process)
+        return is_gone(one, [participant(here, own)], running({one[PROCESS]}))
+
     here, elsewhere, own = b"ab", b"cd", os.getpid()
     ended = subprocess.Popen([sys.executable, "-c", ""])  # not waited for: it has ended but is still listed
-    wait_until(lambda: is_gone(participant(here, ended.pid), [participant(here, own)], running()))
-    assert not is_gone(participant(elsewhere, ended.pid), [participant(here, own)], running())
-    assert not is_gone(participant(here, own), [participant(here, own)], running())
-    assert not is_gone(participant(here, ended.pid), [participant(here, own + 1)], running()), "another numbering"
-    assert not is_gone(participant(here, ended.pid), [participant(here, own)], set()), "no list of processes"
+    wait_until(lambda: gone(here, ended.pid, own))
+    assert not gone(elsewhere, ended.pid, own)
+    assert not gone(here, own, own)
+    assert not gone(here, ended.pid, own + 1), "another numbering"
+    monkeypatch.setattr(subscribers, "PROCESSES", Path("/nowhere"))
+    assert not gone(here, ended.pid, own), "no list of processes"
     ended.wait()

@@ -23,8 +23,8 @@ from rerun.chunk import RrdReader
 from crash_estimator.demo.children import POLITE
 from crash_estimator.nodes import viewer_messages
 from crash_estimator.viewer.blocks import Block, ForceBlock, ParameterBlock, ResidualBlock
+from crash_replay.middleware import prepare_middleware
 from crash_replay.qos import LATCHED, STREAM
-from crash_replay.ros_runtime import acknowledge_promptly
 
 NAMES = ("mrls", "ckf")
 SAMPLES = 240
@@ -90,7 +90,7 @@ def wait_until(done: Callable[[], bool], what: str, patience: float = PATIENCE) 
 @pytest.fixture
 def stage(monkeypatch) -> Iterator[Stage]:
     monkeypatch.setenv("ROS_DOMAIN_ID", str(own_domain()))
-    acknowledge_promptly()
+    prepare_middleware()
     rclpy.init()
     node = Stage()
     yield node

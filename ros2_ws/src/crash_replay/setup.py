@@ -4,7 +4,7 @@ setup(
     name="crash_replay",
     version="0.1.0",
     packages=find_packages(),
-    package_data={"crash_replay": ["fastdds.xml"]},
+    package_data={"crash_replay": ["fastdds_*.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/crash_replay"]),
         ("share/crash_replay", ["package.xml"]),

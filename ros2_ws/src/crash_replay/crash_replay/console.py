@@ -73,7 +73,7 @@ class Console:
             if self.thread.ident:
                 self.thread.join()
             if self.progress:
-                self._draw(progress_line(self.pacing.player, self.pacing.tally.rate))
+                self._draw(self._progress())
                 self._write("\n")
         finally:
             self.contexts.close()
@@ -91,8 +91,11 @@ class Console:
                 time.sleep(PERIOD)
             if self.progress:
                 fresh = time.monotonic() - self.answered_at < SHOWN
-                line = progress_line(self.pacing.player, self.pacing.tally.rate)
+                line = self._progress()
                 self._draw(f"{self.answer}; {line}" if fresh and self.answer else line)
+
+    def _progress(self) -> str:
+        return progress_line(self.pacing.player, self.pacing.rate_now())
 
     def _draw(self, line: str) -> None:
         line = visible(line)[: shutil.get_terminal_size().columns - 1]

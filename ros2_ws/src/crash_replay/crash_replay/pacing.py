@@ -23,7 +23,7 @@ LAST_ACKNOWLEDGEMENT = 30.0
 """Seconds at the end for subscribers to take what has been sent; half a second where a signal has ended the replay."""
 
 
-WAITING = 0.02
+WAITING = 0.1
 """Seconds between two looks at who has come, or is through."""
 SAY_AFTER, SAY_AGAIN = 2.0, 30.0
 """Seconds at the end after which it is said who is waited for, and between two such lines."""
@@ -44,7 +44,7 @@ class Outlet(Protocol):
     """Where samples go: `replay_topics.ReplayTopics`."""
 
     def send(self, batch: Batch) -> None: ...
-    def send_state(self, player: Player, tally: Tally, block: int) -> None: ...
+    def send_state(self, player: Player, tally: Tally, block: int, rate: float) -> None: ...
     def has_room(self, now: float, on_time: bool) -> bool: ...  # for more, at the wall time now
     def wait_for_room(self) -> None: ...  # a moment
     def look(self) -> None: ...  # called where there is time to see what has arrived
@@ -178,6 +178,14 @@ class Pacing:
             self._send_state_if_due()
             time.sleep(WAITING)
 
+    def late(self) -> float:
+        """s by which the next samples are late."""
+        return self.player.late(time.perf_counter(), self.block)
+
+    def rate_now(self) -> float:
+        """Times real time, over the last second of playing."""
+        return self.tally.rate_now(self.late())
+
     def _block(self, player: Player) -> int:
         channels = len(self.recording.test.channels)
         return self.asked_block or suitable_block(self.recording.sample_period, player.rate, channels)
@@ -233,4 +241,4 @@ class Pacing:
 
     def _send_state(self) -> None:
         self.state_due = time.perf_counter() + STATE_PERIOD
-        self.outlet.send_state(self.player, self.tally, self.block)
+        self.outlet.send_state(self.player, self.tally, self.block, self.rate_now())

@@ -8,6 +8,7 @@ The anchor moves only when the replay is resumed, sought, looped or given anothe
 do not add up. Every command gives a new Player; the old one stays as it was.
 """
 
+from collections import deque
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import NamedTuple, Self
@@ -20,6 +21,8 @@ LOWEST_RATE, HIGHEST_RATE = 0.001, 1000.0
 SECOND = 1_000_000_000
 SINGLES, BLOCKS = 1000.0, 400.0
 """Messages a second: at most of one sample each, and about so many of several."""
+NOW = 1.0
+"""s of playing, but two messages at least, over which the present rate is taken."""
 
 
 class CommandError(Fault):
@@ -143,6 +146,11 @@ class Player:
             return self._due(min(self.next + block, self.end) - 1)
         return -np.inf if self.pending else None
 
+    def late(self, now: float, block: int = 1) -> float:
+        """s by which the next samples are late; 0 where none are due."""
+        due = self.due(block)
+        return max(0.0, now - due) if due is not None and self.mode == Mode.PLAYING else 0.0
+
     def take(self, now: float, block: int = 1) -> tuple[Self, Batch | None]:
         """The samples that are due now, at most `block` of them, and the player after them."""
         due = self.due(block)
@@ -210,6 +218,7 @@ class Tally:
     played: float = 0.0  # s in the crash, steps and bursts left out
     took: float = 0.0  # s on the wall clock, for `played`
     previous: tuple[Anchor, Anchor] | None = None  # what the last message was timed by, and when it went out
+    recent: deque[tuple[float, float]] = field(default_factory=lambda: deque([(0.0, 0.0)]))  # played, took; see NOW
 
     def count(self, batch: Batch, last_time_ns: int, wall: float) -> None:
         """A batch whose last sample lies at `last_time_ns` in the crash has gone out at the time `wall`."""
@@ -227,8 +236,17 @@ class Tally:
         self.played += (last_time_ns - last.time_ns) / SECOND
         self.took += wall - last.wall
         self.previous = (batch.anchor, Anchor(wall, last_time_ns))
+        self.recent.append((self.played, self.took))
+        while len(self.recent) > 2 and self.took - self.recent[1][1] > NOW:
+            self.recent.popleft()
 
     @property
     def rate(self) -> float:
         """Times real time, over what has been played; 0 before there is anything to tell it from."""
         return self.played / self.took if self.took > 0 else 0.0
+
+    def rate_now(self, late: float = 0.0) -> float:
+        """Times real time, over the last second of playing; late: s by which the next samples are."""
+        played, took = self.recent[0]
+        took = self.took - took + late
+        return (self.played - played) / took if took > 0 else 0.0

@@ -22,9 +22,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from .middleware import prepare_middleware
 from .qos import EVERY_SAMPLE, EVERY_SAMPLE_SAID
 from .recorder import Heard, Recorder
-from .ros_runtime import acknowledge_promptly, spin
+from .ros_runtime import spin
 
 STAMPED = {
     f"crash_msgs/msg/{name}": False
@@ -128,7 +129,7 @@ def write(recorder: Recorder, file: Path) -> str:
 
 
 def main() -> int:
-    acknowledge_promptly()
+    prepare_middleware()
     # Ctrl-C must end the recording between two messages, not take the context away under it.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:

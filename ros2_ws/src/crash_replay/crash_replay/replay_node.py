@@ -4,6 +4,7 @@ import math
 import signal
 import sys
 from collections.abc import Callable
+from functools import partial
 from threading import Thread
 from typing import Any
 
@@ -21,11 +22,14 @@ from std_srvs.srv import Trigger
 from .bag import read_bag
 from .console import Console, wanted
 from .fault import guarded, tell
+from .health import HealthReport
+from .middleware import prepare_middleware
 from .pacing import Outcome, Pacing
 from .player import SECOND, CommandError, Player
+from .replay_health import replay_health
 from .replay_parameters import LIVE, ParameterError, checked, declare_parameters, names_in, window_of
 from .replay_topics import ReplayTopics
-from .ros_runtime import acknowledge_promptly, spin
+from .ros_runtime import spin
 from .said import say
 from .samples_again import serve_samples
 from .selection import SelectionError, samples_within, select_channels
@@ -50,6 +54,7 @@ class ReplayNode(Node):
         self.create_service(SetRate, "~/set_rate", self._on_set_rate)
         self.create_service(Burst, "~/burst", self._on_burst)
         serve_samples(self, recording)
+        HealthReport(self, "pace", partial(replay_health, self.pacing, topics.audience))
         self.add_on_set_parameters_callback(self._on_parameters)
 
     def replay(self) -> Outcome:
@@ -134,7 +139,7 @@ def main() -> int:
 
 
 def _main() -> int:
-    acknowledge_promptly()
+    prepare_middleware()
     # Ctrl-C must end the replay between two messages, not take the context away under it.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:

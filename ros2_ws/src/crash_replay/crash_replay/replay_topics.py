@@ -120,7 +120,8 @@ class ReplayTopics:
                 value = self.recording.values.item(number, k)
                 self.channels[k].publish(channel_to_msg(channels[k], time, value))
 
-    def send_state(self, player: Player, tally: Tally, block: int) -> None:
+    def send_state(self, player: Player, tally: Tally, block: int, rate: float) -> None:
+        """rate: kept now, times real time."""
         self.find_subscribers()
         if self.flow.acknowledged():
             self.acknowledged = tally.samples
@@ -136,7 +137,7 @@ class ReplayTopics:
             subscribers=self.audience.ready() if player.mode == Mode.WAITING else self.samples.get_subscription_count(),
             time=self.last_time_ns / SECOND,
             rate_asked=player.rate,
-            rate_actual=tally.rate,
+            rate_actual=rate,
             worst_lateness=tally.worst_lateness,
             block=block,
             first=self.first if player.run == self.run else player.next,

@@ -1,9 +1,7 @@
 """What a node needs of rclpy and the middleware beside its topics."""
 
-import os
 import signal
 from collections.abc import Callable
-from pathlib import Path
 
 import rclpy
 from rclpy.clock import Clock, ClockType
@@ -15,17 +13,10 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from .fault import guarded, tell
+from .middleware import prepare_middleware
 
-PROFILES = Path(__file__).with_name("fastdds.xml")
-PROFILES_VARIABLE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 LOOK = 0.1
 """s between two looks at whether a signal has come."""
-
-
-def acknowledge_promptly() -> None:
-    """Let Fast DDS notice and repair a lost message within some 10 ms; before rclpy.init, a user's own profiles win."""
-    if not os.environ.get("FASTDDS_DEFAULT_PROFILES_FILE"):
-        os.environ.setdefault(PROFILES_VARIABLE, str(PROFILES))
 
 
 def spin(executor: Executor, until: Future) -> None:
@@ -53,7 +44,7 @@ def run(
 
 
 def _run(make: Callable[[], Node], until: Callable[[Node], Future], close: Callable[[Node], str | None]) -> int:
-    acknowledge_promptly()
+    prepare_middleware()
     # A signal must end the node between two callbacks, not take the context away under the executor.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     signals: list[int] = []

@@ -1,8 +1,7 @@
 """Who a reliable publisher waits for. The middleware does not tell, but has all who subscribe, and their processes."""
 
 import os
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Sequence, Set
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -10,10 +9,10 @@ from rclpy.qos import ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from .obituary import announce_end
+from .processes import PROCESSES, has_ended
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
 """As rcl calls the node of a publisher or subscription that was found before its node was."""
-PROCESSES = Path("/proc")
 HOST, PROCESS = slice(2, 4), slice(4, 6)
 """Of a GUID of Fast DDS: a number for the machine, and the last 16 bits of the process's number."""
 
@@ -44,8 +43,9 @@ def killed(node: Node, topic: str) -> list[TopicEndpointInfo]:
     It is told so.
     """
     own = [process_of(e) for e in node.get_publishers_info_by_topic(topic)]
-    processes = running()
-    gone = [e for e in node.get_subscriptions_info_by_topic(topic) if is_gone(process_of(e), own, processes)]
+    listening = node.get_subscriptions_info_by_topic(topic)
+    processes = running({process_of(e)[PROCESS] for e in listening})
+    gone = [e for e in listening if is_gone(process_of(e), own, processes)]
     for participant in {process_of(e) for e in gone}:
         announce_end(participant, node.context.get_domain_id())
     return gone
@@ -59,26 +59,25 @@ def _said(endpoint: TopicEndpointInfo) -> str:
     return "a node not known by name" if endpoint.node_name == UNNAMED else node_name(endpoint)
 
 
-def is_gone(participant: bytes, own: Sequence[bytes], processes: set[bytes]) -> bool:
+def is_gone(participant: bytes, own: Sequence[bytes], processes: Set[bytes]) -> bool:
     """Whether it was of a process of this machine that runs no more; False where that cannot be known.
 
-    own: participants on the node's topics, this process's among them unless the middleware numbers them otherwise.
+    own: participants on the node's topics, this process's among them unless the middleware numbers them otherwise;
+    processes: `running` of the participant's.
     """
     here = {one[HOST] for one in own if one[PROCESS] == _last_bits(os.getpid())}
-    return bool(processes) and participant[HOST] in here and participant[PROCESS] not in processes
+    return participant[HOST] in here and participant[PROCESS] not in processes
 
 
-def running() -> set[bytes]:
-    """The last 16 bits of the numbers of all processes; none where the system does not list them."""
-    return {_last_bits(int(folder.name)) for folder in PROCESSES.glob("[0-9]*") if not _has_ended(folder)}
+def running(looked_for: Set[bytes]) -> Set[bytes]:
+    """Those of these last 16 bits of numbers of processes that one which runs has; all where the system tells nothing.
 
-
-def _has_ended(folder: Path) -> bool:
-    """Its parent may not have taken note of it yet."""
-    try:
-        return (folder / "stat").read_text().rpartition(")")[2].split()[0] in "ZX"
-    except OSError:
-        return True
+    A replay that waits asks again and again: of the many processes only these are looked at.
+    """
+    if not looked_for or not PROCESSES.is_dir():
+        return looked_for
+    numbers = [int(name) for name in os.listdir(PROCESSES) if name.isdecimal()]
+    return {_last_bits(n) for n in numbers if _last_bits(n) in looked_for and not has_ended(n)}
 
 
 def _last_bits(process: int) -> bytes:

@@ -16,6 +16,7 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from crash_replay.middleware import prepare_middleware
 from crash_replay.qos import EVERY_SAMPLE, LATCHED, STREAM
 from crash_replay.recording import Recording
 from crash_replay.ros_messages import samples_to_msg, test_to_msg
@@ -232,4 +233,5 @@ def _off_beat(times: Sequence[float], period: float) -> np.ndarray:
 
 
 def start_ros(environment: dict[str, str]) -> None:
+    prepare_middleware()
     rclpy.init(domain_id=int(environment["ROS_DOMAIN_ID"]))

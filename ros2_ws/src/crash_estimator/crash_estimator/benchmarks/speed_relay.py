@@ -14,8 +14,9 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 
+from crash_replay.middleware import prepare_middleware
 from crash_replay.qos import EVERY_SAMPLE, STREAM
-from crash_replay.ros_runtime import acknowledge_promptly, spin
+from crash_replay.ros_runtime import spin
 
 FIELDS = {
     Parameters: {"name": "", "value": 1, "std": 1, "status": 0},
@@ -66,7 +67,7 @@ class Relay(Node):
 
 
 def main() -> int:
-    acknowledge_promptly()
+    prepare_middleware()
     rclpy.init()
     executor = EventsExecutor()
     executor.add_node(Relay())

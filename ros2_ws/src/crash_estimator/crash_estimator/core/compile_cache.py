@@ -6,10 +6,12 @@ files: after an update it would go on running old code. Import this before defin
 
 import hashlib
 import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from numba import config
-
+from numba.core.event import Event, Listener, install_listener
 
 INDEPENDENT = {"diagnosis", "effects"}
 """Folders of the core that the compiled recursion takes nothing from."""
@@ -23,3 +25,23 @@ def _fingerprint(folder: Path) -> str:
 _cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "crash_estimator"
 if not os.environ.get("NUMBA_CACHE_DIR"):
     config.CACHE_DIR = str(_cache / _fingerprint(Path(__file__).parent))
+
+
+class _Once(Listener):
+    def __init__(self, say: Callable[[str], object]):
+        self.say, self.said = say, False
+
+    def on_start(self, event: Event) -> None:
+        if not self.said:
+            self.said = True
+            self.say("compiling code that is not in the cache: this first start takes up to a minute longer")
+
+    def on_end(self, event: Event) -> None:
+        pass
+
+
+@contextmanager
+def compiling_said(say: Callable[[str], object]) -> Iterator[None]:
+    """Say one line if anything must be compiled within, as no set-up or earlier start has done it."""
+    with install_listener("numba:compile", _Once(say)):
+        yield

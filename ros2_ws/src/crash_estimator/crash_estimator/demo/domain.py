@@ -26,6 +26,5 @@ def _is_free(domain: int) -> bool:
 
 
 def own_environment() -> dict[str, str]:
-    """The environment of what is started: this machine only, and a domain of its own unless one is set."""
-    defaults = {"ROS_DOMAIN_ID": str(free_domain()), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    return defaults | os.environ
+    """The environment of what is started: a domain of its own unless one is set."""
+    return {"ROS_DOMAIN_ID": str(free_domain())} | os.environ

@@ -11,7 +11,7 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from crash_replay.fault import Fault
-from crash_replay.ros_runtime import acknowledge_promptly
+from crash_replay.middleware import prepare_middleware
 
 from ..core.errors import equation_errors
 from ..tables import error_table, parameter_table
@@ -62,7 +62,7 @@ class Run:
 
     def to_the_end(self) -> int:
         """Exit status 0, or 1 where the replay, the diagnosis or every estimator died."""
-        acknowledge_promptly()
+        prepare_middleware()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         watch, executor = Watch(list(self.choices), ["diagnosis"] if self.story else []), EventsExecutor()
         executor.add_node(watch)

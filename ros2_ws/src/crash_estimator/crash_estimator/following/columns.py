@@ -13,7 +13,7 @@ from ..core.methods import AnyEstimator
 from ..kept import Rows
 
 FIELDS = (
-    *("status", "measured", "predicted", "innovation", "residual", "residual_std"),
+    *("covariance", "status", "measured", "predicted", "innovation", "residual", "residual_std"),
     *("crush", "rate", "force", "force_std", "state", "displacement", "velocity", "acceleration"),
 )
 """Of an `Estimate`, taken as they are."""

@@ -7,6 +7,7 @@ a new revision of its model, and the same question is asked of it on the samples
 
 import sys
 from collections.abc import Callable
+from functools import partial
 
 from crash_msgs.msg import Samples, TestInfo
 from crash_msgs.srv import AddEffect, RemoveEffect
@@ -16,6 +17,7 @@ from rclpy.task import Future
 
 from crash_replay.attending import Attending, Progress
 from crash_replay.bag import read_bag
+from crash_replay.health import HealthReport
 from crash_replay.qos import EVERY_SAMPLE, LATCHED
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import stamp, stamp_ns, test_from_msg
@@ -36,6 +38,7 @@ from .diagnosis_messages import Moment
 from .diagnosis_telling import Telling
 from .diagnosis_worker import Task, Worker, WorkerError
 from .effect_requests import request_of, with_effect
+from .node_health import diagnosis_health
 from .samples import rows_of
 
 LOOK = 0.02
@@ -84,6 +87,7 @@ class DiagnosisNode(Node):
         self.asking = Asking(self, f"{replay}/get_samples", self.attending, self._on_samples_again)
         self.catching_up = CatchingUp(self, self.attending, self._place, self._ask_for_rest)
         self.feed = ChannelFeed(self, "samples", self._on_feed_begins, self._on_feed)
+        HealthReport(self, "answers", partial(diagnosis_health, self))
         self.create_subscription(TestInfo, "test", self._on_test, LATCHED)
         self.create_subscription(Samples, "samples", self._on_samples, EVERY_SAMPLE)
         self.create_timer(LOOK, self._look)

@@ -23,12 +23,13 @@ class Telling:
         self.revisions_out = node.create_publisher(Residuals, "~/revisions", SAID)
         self.told: dict[int, Told] = {}  # final answers by revision
         self.drawn = 0  # number of the first sample that no curve has been published of in this pass
+        self.last = ""  # what was told last in this pass
 
     def begin_test(self) -> None:
         self.told.clear()
 
     def begin_pass(self) -> None:
-        self.drawn = 0
+        self.drawn, self.last = 0, ""
 
     def name(self, structure: Structure) -> str:
         return revision_name(self.given, structure, ())
@@ -40,6 +41,7 @@ class Telling:
         numbers = kept.numbers(at.number + 1)[-len(answer.fits[0].time_ns) :]
         rows = slice(0 if at.final else int(np.searchsorted(numbers, self.drawn)), None)
         self.drawn = at.number + 1
+        self.last = f"{answer.verdict}, {'final' if at.final else f'up to sample {at.number}'}"
         for fit in answer.fits:
             name = revision_name(self.given, at.structure, fit.effects)
             first = stamp(time_zero + int(fit.time_ns[rows][0]))

@@ -7,6 +7,7 @@ import sys
 import traceback
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from multiprocessing.connection import Connection, Pipe
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ import numpy as np
 from crash_replay.bag import read_bag
 from crash_replay.recording import Channel, Recording, RecordingError, Test
 
+from ..core.compile_cache import compiling_said
 from ..core.diagnosis.diagnosis import diagnose
 from ..core.diagnosis.live import LiveDiagnosis, LiveState
 from ..core.diagnosis.live_answer import LiveAnswer, final_answer
@@ -153,7 +155,8 @@ def main(fd: int) -> None:
     with Connection(fd) as node:
         structure, effects_file, bags = node.recv()
         effects = EFFECTS | (load_effects(effects_file) if effects_file else {})
-        Answerer(effects).try_out(structure)
+        with compiling_said(partial(print, "diagnosis:", file=sys.stderr, flush=True)):
+            Answerer(effects).try_out(structure)
         answerer = Answerer(effects, [read_bag(bag) for bag in bags])
         node.send(Reply(None))
         with suppress(EOFError, BrokenPipeError):  # the node has gone

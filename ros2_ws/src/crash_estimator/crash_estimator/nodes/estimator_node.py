@@ -7,6 +7,7 @@ Several run side by side under different names (`--ros-args -r __node:=mrls`).
 
 import sys
 from collections.abc import Callable
+from functools import partial
 
 from crash_msgs.msg import Samples, TestInfo
 from crash_msgs.srv import AddEffect, RemoveEffect
@@ -15,17 +16,19 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from crash_replay.attending import Attending, Progress
+from crash_replay.health import HealthReport
 from crash_replay.qos import EVERY_SAMPLE, LATCHED, UNLATCHED
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import stamp_ns, test_from_msg
 from crash_replay.ros_runtime import run
 
+from ..core.compile_cache import compiling_said
 from ..core.effects.change import remove_effect
 from ..core.methods import METHODS
 from ..core.structure import ModelError, Structure
 from ..following.again import estimated_again
 from ..following.arrivals import Waiting, missing_text
-from ..following.columns import FilterFailure
+from ..following.columns import Columns, FilterFailure
 from ..following.follower import Follower
 from ..kept import Kept, Rows
 from ..model_file import ready_models
@@ -35,6 +38,7 @@ from .estimates_again import EstimatesAgain
 from .estimator_model import EstimatorModel
 from .estimator_topics import EstimatorTopics
 from .intake import Intake
+from .node_health import estimator_health
 from .samples import MOST, Received, received, rows_of, what_is_wrong
 
 
@@ -42,25 +46,29 @@ class EstimatorNode(Node):
     def __init__(self, **options) -> None:
         """options: of rclpy's Node, such as parameter_overrides. Raises ModelError with one line."""
         super().__init__("estimator", **options)
-        self.model = EstimatorModel(
-            method=self._declared("method", "constrained_kalman", f"one of {', '.join(METHODS)}"),
-            model=self._declared("model", "", f"a .yaml file, or one of {', '.join(ready_models())}"),
-            settings=self._declared("settings", [""], "settings of the method, such as forgetting=0.98"),
-            effects=self._declared("effects", "", "your own effects, a .py file; it is executed"),
-            effective_mass=self._declared(
+        asked = {
+            "method": self._declared("method", "constrained_kalman", f"one of {', '.join(METHODS)}"),
+            "model": self._declared("model", "", f"a .yaml file, or one of {', '.join(ready_models())}"),
+            "settings": self._declared("settings", [""], "settings of the method, such as forgetting=0.98"),
+            "effects": self._declared("effects", "", "your own effects, a .py file; it is executed"),
+            "effective_mass": self._declared(
                 "effective_mass", False, "find the masses that go with the accelerometers first"
             ),
-        )
+        }
+        with compiling_said(self.get_logger().info):
+            self.model = EstimatorModel(**asked)
         replay = self._declared("replay", "replay", "node that samples are asked of which were missed")
         self.test_message: TestInfo | None = None
         self.unlatched: TestInfo | None = None  # come by itself, and to come once more if its publisher latches
         self.follower: Follower | None = None  # None: no test yet, or one that the model does not fit
+        self.latest: Columns | None = None  # estimates of this test
         self.stopped = ""  # why no filter can go on with these numbers, until the next pass
         self.at_fault = ""  # why nothing is estimated on this test
         self.topics = EstimatorTopics(self)
         self.again = EstimatesAgain(self)
         self.attending = Attending(self, "estimator", self._progress)
         self.intake = Intake(self, f"{replay}/get_samples", self.attending, self)
+        HealthReport(self, "filter", partial(estimator_health, self))
         self.create_service(Trigger, "~/reset", self._on_reset)
         self.create_service(AddEffect, "~/add_effect", self._on_add_effect)
         self.create_service(RemoveEffect, "~/remove_effect", self._on_remove_effect)
@@ -87,6 +95,7 @@ class EstimatorNode(Node):
 
     def _begin_test(self, message: TestInfo) -> None:
         self.test_message, self.follower, self.stopped, self.at_fault = message, None, "", ""
+        self.latest = None
         self.intake.begin_test(listening=False)
         try:
             test = test_from_msg(message)
@@ -177,6 +186,7 @@ class EstimatorNode(Node):
                 f"{failure}; it starts again with the next pass over the test, or with the service ~/reset"
             )
         if columns:
+            self.latest = columns
             self.topics.estimates(samples.run, columns, samples.stamp_ns)
 
     def _tell_of_missing(self, samples: Waiting) -> None:
@@ -220,7 +230,7 @@ class EstimatorNode(Node):
             response.message = f"{failure}: model {self.model.structure.name} stays as it is"
             return response
         self.model.revise(structure)
-        self.stopped = ""
+        self.stopped, self.latest = "", None
         name = f"revision {self.model.revision}: {structure.name} with {', '.join(self.model.effects()) or 'no effect'}"
         response.success, response.message = True, name + (f"; {done}" if done else "")
         self.get_logger().info(response.message)

@@ -20,6 +20,7 @@ from rclpy.subscription import Subscription
 from rclpy.task import Future
 
 from crash_replay.foreign_text import visible
+from crash_replay.health import HealthReport
 from crash_replay.output import check_outputs
 from crash_replay.qos import LATCHED, SAID, STREAM, UNACKNOWLEDGED
 from crash_replay.ros_runtime import run
@@ -30,6 +31,7 @@ from ..model_file import load_model, ready_models
 from ..viewer.native import has_display, open_viewer
 from ..viewer.recorder import Recorder
 from ..viewer.sinks import Sinks
+from .node_health import viewer_health
 from .viewer_messages import BLOCK_OF, FINDING_OF, test_block
 
 QUIET = 3.0
@@ -84,6 +86,7 @@ class ViewerNode(Node):
             self.create_subscription(kind, topic, queue, SAID, raw=True)
         for name in self.estimators:
             self._follow(name)
+        HealthReport(self, "queue", partial(viewer_health, self.recorder))
         self.create_timer(0.1, self._look_around)
 
     def _declared(self, name: str, default, description: str):

@@ -45,6 +45,16 @@ class Entry(NamedTuple):
     size: int  # bytes
 
 
+class Queue(NamedTuple):
+    """How full it is, and what has not come through."""
+
+    items: int
+    size: int  # bytes
+    dropped: int  # items
+    troubles: int  # kinds of items that could not be drawn
+    test: str  # id of the one that is drawn
+
+
 class Recorder:
     """Takes the blocks of each estimator in their order and writes them in batches."""
 
@@ -109,6 +119,12 @@ class Recorder:
 
     def _is_kept(self, entry: Entry) -> bool:
         return entry.stream is None or entry.index % self._stride == 0
+
+    def queue(self) -> Queue:
+        """How it stands."""
+        with self._guard:
+            test = self._test.id if self._test else ""
+            return Queue(len(self._queue), self._held, self.dropped, len(self._troubles), test)
 
     @property
     def idle(self) -> bool:

@@ -102,7 +102,8 @@ def linearise(
     crush_ends = np.array([link.crush_ends for link in layout.links]).reshape(-1, 2)
     column, body, acts = (np.array(each) for each in zip(*acting))
     n = len(forces)
-    kx, kv, kp = np.array([(f.kx, f.kv, f.kp) for f in forces], float).reshape(n, 3, g).transpose(1, 0, 2)
+    slopes = np.array([(f.kx, f.kv, f.kp) for f in forces], float).reshape(n, 3, g).transpose(1, 0, 2)
+    kx, kv, kp = np.ascontiguousarray(slopes)  # as one link's are already: for two layouts all would be compiled twice
     peaks = [f.loading & f.kp.any() for f in forces]  # none is kept that nothing hangs on
     loading = np.array(peaks, bool).reshape(n, g)
     weight = np.array([f.weight for f in forces], float).reshape(n, g, 2)
