@@ -19,6 +19,8 @@ LIMIT = 180.0
 """s that a run may take, beside the time for which its faults last."""
 COMPILING = 1020.0
 """s more where nothing is compiled yet."""
+TRIES = 3
+"""Of a case, where others on this machine have come into its ROS domain."""
 BURNING = 8
 """Processes beside a busy run."""
 ENDING = 60.0
@@ -105,6 +107,11 @@ class Run:
         word = self.observer.words.word(f"/{name}")
         return word is not None and word.total > 0 and word.next >= word.total and not word.missing
 
+    @property
+    def strangers(self) -> list[str]:
+        """Nodes that take part and are not of the run: somebody else came upon the same ROS domain."""
+        return sorted(set(self.observer.words.names()) - {f"/{name}" for name in self.tops})
+
     def _products(self) -> dict[str, Product]:
         made = {
             f"estimates of {name}": Product(name, {str(k): v for k, v in estimates.items()})
@@ -146,8 +153,12 @@ class Run:
 def run_case(case: Case, out: Path, reference: dict[str, Content] | None) -> dict:
     """Its row of results; without a reference it is to become one itself."""
     began = time.monotonic()
-    run = Run(case, out / "logs" / case.name.replace("/", "__").replace(":", "."), out / "recordings")
-    outcome = run.outcome()
+    folder = out / "logs" / case.name.replace("/", "__").replace(":", ".")
+    for _ in range(TRIES):
+        run = Run(case, folder, out / "recordings")
+        outcome = run.outcome()
+        if not run.strangers:
+            break
     contents = {name: dict(product.content) for name, product in outcome.products.items()}
     if reference is None and any(not content for content in contents.values()):
         empty = ", ".join(name for name, content in contents.items() if not content)
@@ -163,5 +174,6 @@ def run_case(case: Case, out: Path, reference: dict[str, Content] | None) -> dic
         "not carried out": [fault.name for fault in run.faults.pending],
         "statuses": {ended.name: ended.status for ended in outcome.ended},
         "contradictions": {name: len(numbers) for name, numbers in run.observer.contradictions.items() if numbers},
+        "strangers": run.strangers,
         "contents": contents if reference is None else {},
     }
