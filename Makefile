@@ -1,4 +1,4 @@
-.PHONY: help demo test bags thesis benchmark benchmark-effects clean
+.PHONY: help demo test bags thesis benchmark benchmark-effects chaos endurance clean
 
 help: # what there is to make
 	@sed -n 's/^\([a-z-]*\):.*# /make \1	/p' Makefile
@@ -29,6 +29,12 @@ benchmark: # every promised speed beside its reference, 8 minutes: docs/benchmar
 
 benchmark-effects: # which hidden effects are found, on 1500 simulated tests: docs/missing-effects.md; ARGS="--cases 20" writes out/missing-effects.md
 	@tools/env python -m crash_estimator.benchmarks.effects $(ARGS)
+
+chaos: # processes killed, stopped and started again on purpose, 200 runs: docs/chaos.md; ARGS="--runs 20", --seed, --only, --case
+	@tools/env python -m crash_estimator.chaos $(ARGS)
+
+endurance: # a million samples through every method, 500 tests and 500 passes through every node: docs/endurance.md
+	@tools/env python -m crash_estimator.endurance $(ARGS)
 
 clean: # removes what the set-up installed and built, and what the programs wrote
 	rm -rf .venv .setup out ros2_ws/build ros2_ws/install ros2_ws/log

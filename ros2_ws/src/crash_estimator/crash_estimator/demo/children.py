@@ -41,7 +41,7 @@ class Child:
                 stderr=subprocess.STDOUT,
                 env=dict(environment),
                 start_new_session=True,  # Ctrl-C reaches the demonstration alone, which then ends the others in order
-                preexec_fn=partial(_end_with, os.getpid()) if LINUX else None,
+                preexec_fn=partial(end_with, os.getpid()) if LINUX else None,
             )
 
     @property
@@ -119,7 +119,7 @@ def _yaml(value: object) -> str:
     return json.dumps(value)
 
 
-def _end_with(parent: int) -> None:
+def end_with(parent: int) -> None:
     """Ask Linux to end this process when the demonstration is gone, even where that was killed."""
     LIBC.prctl(SET_PARENT_DEATH_SIGNAL, signal.SIGTERM)
     if os.getppid() != parent:  # it was gone already

@@ -1,0 +1,1 @@
+"""Faults on purpose: a disturbed use of the project must end complete and identical, or say what is incomplete."""

@@ -1,0 +1,61 @@
+"""`chaos`: disturb the project's uses with kills, stops and the like, and judge what comes of it: docs/chaos.md."""
+
+import argparse
+import sys
+from collections import Counter
+from pathlib import Path
+
+from ..cli.common import guarded
+from ..figures import write_markdown
+from .case import case_of
+from .judge import FAILED
+from .page import page
+from .plan import MEMBERS, plan
+from .results import RESULTS, NoReference, references, rows
+
+RUNS, SEED = 200, 1
+FIRST_START = "terminals/frontal/busy+cold_caches"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="chaos", description=__doc__.partition(": ")[2])
+    parser.add_argument("--runs", type=int, default=RUNS, metavar="N", help="default %(default)s")
+    parser.add_argument("--seed", type=int, default=SEED, metavar="S", help="of the faults, default %(default)s")
+    parser.add_argument("--only", metavar="NAME", help="only cases with this in their names, such as stop:replay")
+    parser.add_argument("--case", metavar="NAME", help="only this one; no page is written")
+    parser.add_argument("--first-start", action="store_true", help="only the first start of all, on a busy machine")
+    parser.add_argument("--jobs", type=int, default=2, metavar="J", help="runs side by side, default %(default)s")
+    parser.add_argument("--uses", nargs="+", choices=[*MEMBERS], default=[*MEMBERS], help="default: all")
+    parser.add_argument("--out", type=Path, default=Path("out/chaos"), help="for logs and results, default %(default)s")
+    parser.add_argument("--to", type=Path, default=Path("docs/chaos.md"), metavar="PAGE.md")
+    arguments = parser.parse_args()
+    return guarded(lambda: _run(arguments))
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    if name := arguments.case or (FIRST_START if arguments.first_start else ""):
+        cases = [case_of(name)]
+    else:
+        drawn = plan(arguments.seed, arguments.runs, arguments.uses)
+        cases = [case for case in drawn if (arguments.only or "") in case.name]
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    (arguments.out / RESULTS).unlink(missing_ok=True)
+    try:
+        found = references(cases, arguments.out)
+    except NoReference as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    done = []
+    for row in rows(cases, arguments.out, found, arguments.jobs):
+        done.append(row)
+        what = f"{row['verdict']}, {row['seconds']:g} s {row['why']}"
+        print(f"{len(done)}/{len(cases)} {row['case']}: {what}", flush=True)
+    counts = Counter(row["verdict"] for row in done)
+    print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
+    if not (name or arguments.only):
+        write_markdown(arguments.to, [page(done, arguments.seed)])
+    return 1 if counts[FAILED] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,64 @@
+"""Carries out the faults of a case, each at its moment."""
+
+import signal
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+from .case import FINISHED, HANG_UP, KILL, LASTING, PLAYED, RESTART, STOP, Fault
+from .members import Member, send
+
+
+class Disturbed(Protocol):
+    """The run."""
+
+    def top(self, name: str) -> Member | None: ...  # a process that we have started ourselves
+    def process(self, name: str) -> int: ...  # its number; 0: there is none (yet)
+    def since_start(self, name: str) -> float: ...  # s since it was started
+    played: float  # % of the samples
+    since_finish: float  # s since the last sample; negative: not yet
+
+
+class Faults:
+    def __init__(self, faults: list[Fault], run: Disturbed):
+        self.run, self.pending = run, [fault for fault in faults if fault.member]
+        self.ends: list[tuple[float, Callable[[], None]]] = []  # when what is stopped or gone comes back
+        self.log: list[str] = []
+
+    @property
+    def active(self) -> bool:
+        return bool(self.ends)
+
+    def look(self) -> None:
+        now = time.monotonic()
+        for fault in [fault for fault in self.pending if self._is_due(fault)]:
+            if process := self.run.process(fault.member):
+                self.pending.remove(fault)
+                self._begin(fault, process, now)
+        due = [end for end in self.ends if end[0] <= now]
+        self.ends = [end for end in self.ends if end[0] > now]
+        for _, come_back in due:
+            come_back()
+
+    def _is_due(self, fault: Fault) -> bool:
+        if fault.anchor == PLAYED:
+            return self.run.played >= fault.at
+        passed = self.run.since_finish if fault.anchor == FINISHED else self.run.since_start(fault.member)
+        return passed >= fault.at
+
+    def _begin(self, fault: Fault, process: int, now: float) -> None:
+        self.log.append(f"{fault.name}: process {process}, {self.run.played:.0f} % of the samples sent")
+        top = self.run.top(fault.member)
+        come_back: Callable[[], None] = lambda: None  # noqa: E731
+        if fault.kind == HANG_UP:
+            top.hang_up()
+        elif fault.kind in (KILL, RESTART) and top:
+            top.kill()
+            come_back = top.start
+        elif fault.kind == STOP:
+            send(process, signal.SIGSTOP)
+            come_back = lambda: send(process, signal.SIGCONT)  # noqa: E731
+        else:
+            send(process, signal.SIGKILL)
+        if fault.kind in LASTING:
+            self.ends.append((now + fault.seconds, come_back))

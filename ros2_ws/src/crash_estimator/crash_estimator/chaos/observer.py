@@ -1,0 +1,117 @@
+"""Listens to a run: what the estimators and the diagnosis say, how far the replay is, who says what of himself."""
+
+import hashlib
+import time
+from array import array
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+import rclpy
+from crash_msgs.msg import Attendance as AttendanceMessage
+from crash_msgs.msg import Parameters, Ranking, ReplayState
+from crash_msgs.srv import GetEstimates
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+
+from crash_replay.attendance import Attendance, Word
+from crash_replay.attending import TOPIC
+from crash_replay.qos import EVERY_SAMPLE, EVERY_SAMPLE_SAID, LATCHED, SAID
+
+PIECE = 100
+"""Samples that an estimator is asked for at once."""
+PATIENCE = 10.0
+"""s for it to answer."""
+
+
+class Observer:
+    """A node of the judge's own, on the run's domain. It takes no part: nobody waits for it."""
+
+    def __init__(self, domain: int, estimators: Sequence[str], diagnosis: str = "diagnosis"):
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = Node("observer", context=self.context)
+        self.executor = EventsExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.words = Attendance()
+        self.state: ReplayState | None = None
+        self.sent_any = False
+        self.estimates: dict[str, dict[int, str]] = {name: {} for name in estimators}
+        self.contradictions: dict[str, set[int]] = {name: set() for name in estimators}
+        self.final: dict[int, str] = {}  # what the diagnosis has said at the end, by revision
+        node = self.node
+        for name in estimators:
+            node.create_subscription(Parameters, f"{name}/parameters", partial(self._on_parameters, name), EVERY_SAMPLE)
+        node.create_subscription(Ranking, f"{diagnosis}/ranking", self._on_ranking, SAID)
+        node.create_subscription(ReplayState, "replay_state", self._on_state, LATCHED)
+        node.create_subscription(AttendanceMessage, TOPIC, self._on_word, EVERY_SAMPLE_SAID)
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self.context)
+
+    def spin(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
+        """Listen for so long, or until something is so -> whether it is."""
+        deadline = time.monotonic() + seconds
+        while not (done := until()) and time.monotonic() < deadline:
+            self.executor.spin_once(timeout_sec=0.02)
+        return done
+
+    @property
+    def played(self) -> float:
+        """% of the samples that have been sent."""
+        return 100.0 * self.state.number / self.state.total if self.state and self.state.total else 0.0
+
+    @property
+    def finished(self) -> bool:
+        return self.state is not None and self.state.state == ReplayState.FINISHED
+
+    @property
+    def total(self) -> int:
+        return self.state.total if self.state else 0
+
+    def ask_for_missed(self, name: str) -> None:
+        """What was said while nobody heard it, once more."""
+        client = self.node.create_client(GetEstimates, f"{name}/get_estimates")
+        start = 0
+        while start < self.total:
+            if start in self.estimates[name]:
+                start += 1
+                continue
+            if not self.spin(PATIENCE, client.service_is_ready):
+                break
+            call = client.call_async(GetEstimates.Request(start=start, stop=min(start + PIECE, self.total)))
+            if not self.spin(PATIENCE, call.done) or not call.result().success:
+                break
+            self._on_parameters(name, call.result().parameters)
+        self.node.destroy_client(client)
+
+    def _on_parameters(self, name: str, message: Parameters) -> None:
+        samples = len(message.time_ns)
+        rows = [_rows(message.value, samples), _rows(message.std, samples), _rows(message.status, samples)]
+        for k in range(samples):
+            number, digest = message.number + k, _digest(*(row[k].tobytes() for row in rows))
+            if self.estimates[name].setdefault(number, digest) != digest:
+                self.contradictions[name].add(number)
+                self.estimates[name][number] = digest
+
+    def _on_ranking(self, message: Ranking) -> None:
+        if message.final:
+            found = ", ".join(message.found) or "nothing"
+            self.final[message.revision] = f"{message.model}: {message.text} ({found})"
+
+    def _on_state(self, message: ReplayState) -> None:
+        self.state = message
+        self.sent_any |= message.number > 0
+
+    def _on_word(self, message: AttendanceMessage) -> None:
+        self.words.hear(Word(*(getattr(message, field) for field in Word._fields)))
+
+
+def _rows(values: array, samples: int) -> np.ndarray:
+    return np.asarray(values).reshape(samples, -1)
+
+
+def _digest(*parts: bytes) -> str:
+    return hashlib.blake2b(b"".join(parts), digest_size=8).hexdigest()

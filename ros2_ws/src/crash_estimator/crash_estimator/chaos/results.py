@@ -1,0 +1,48 @@
+"""Runs side by side, each judged by a process of its own, and a file of what came of them."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+
+from .case import Case
+from .judge import COMPLETE, Content
+from .recordings import bag_of
+from .run import run_case
+
+RESULTS = "results.jsonl"
+"""In the folder of a run's logs: a row of JSON for each case."""
+
+
+class NoReference(RuntimeError):
+    """Undisturbed it is not complete either; the message is one readable line."""
+
+
+def references(cases: Sequence[Case], out: Path) -> dict[str, dict[str, Content]]:
+    """What each use makes of each recording undisturbed, by the name of that case."""
+    found = {}
+    for case in dict.fromkeys(case.undisturbed for case in cases):
+        bag_of(case.recording, out / "recordings")  # not by several at once
+        row = next(_in_processes([case], out, {case.name: None}, 1))
+        if row["verdict"] != COMPLETE:
+            raise NoReference(f"{case.name}: {row['verdict']}: {row['why']}; its logs are in {out / 'logs'}")
+        found[case.name] = row["contents"]
+    return found
+
+
+def rows(
+    cases: Sequence[Case], out: Path, found: Mapping[str, dict[str, Content]], jobs: int
+) -> Iterator[dict]:
+    """In the order in which they are done; each is added to the file of results."""
+    for row in _in_processes(cases, out, found, jobs):
+        with (out / RESULTS).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+        yield row
+
+
+def _in_processes(cases, out: Path, found: Mapping, jobs: int) -> Iterator[dict]:
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:
+        tasks = [pool.submit(run_case, case, out, found[case.undisturbed.name]) for case in cases]
+        for task in as_completed(tasks):
+            yield task.result()

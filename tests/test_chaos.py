@@ -1,0 +1,46 @@
+"""Some of the cheapest disturbed runs, so that what `make chaos` counts is known to be carried out and judged."""
+
+import pytest
+
+from crash_estimator.chaos.case import case_of
+from crash_estimator.chaos.judge import COMPLETE, SAID
+from crash_estimator.chaos.results import references
+from crash_estimator.chaos.run import run_case
+
+STOPPED = "estimators/frontal/stop:kalman@played30%:7s"
+KILLED = "estimators/frontal/kill:rls@played50%"
+HUNG_UP = "estimators/frontal/hang_up:kalman@played40%"
+WITHOUT_REPLAY = "estimators/frontal/kill:replay@played60%"
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    return tmp_path_factory.mktemp("chaos")
+
+
+@pytest.fixture(scope="module")
+def reference(out):
+    case = case_of(STOPPED)
+    return references([case], out)[case.undisturbed.name]
+
+
+@pytest.mark.parametrize(
+    "name, verdict, statuses",
+    [
+        (STOPPED, COMPLETE, {"kalman": 0, "rls": 0, "replay": 0}),
+        (KILLED, SAID, {"kalman": 0, "rls": -9, "replay": 1}),
+        (HUNG_UP, SAID, {"kalman": -1, "rls": 0, "replay": 1}),
+        (WITHOUT_REPLAY, SAID, {"kalman": 1, "rls": 1, "replay": -9}),
+    ],
+)
+def test_run(name, verdict, statuses, out, reference):
+    row = run_case(case_of(name), out, reference)
+    assert (row["verdict"], row["statuses"]) == (verdict, statuses), row
+    assert row["carried out"] and not row["not carried out"]
+
+
+def test_a_wrong_reference_is_noticed(out, reference):
+    """A run that is whole and says so fails where its numbers are not those of the reference."""
+    other = {name: content | {"5": "another"} for name, content in reference.items()}
+    row = run_case(case_of("estimators/frontal/undisturbed"), out, other)
+    assert row["verdict"] == "FAILED" and "1 of 341 other than undisturbed" in row["why"]
