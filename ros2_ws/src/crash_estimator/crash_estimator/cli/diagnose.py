@@ -33,7 +33,7 @@ def main() -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     effects = effects_of(arguments)
-    structure = load_model(arguments.model)
+    structure = load_model(arguments.model, effects)
     for option, path in (("--json", arguments.json), ("--apply", arguments.apply)):
         if path:
             _writable(option, Path(path))

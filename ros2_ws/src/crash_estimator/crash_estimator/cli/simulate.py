@@ -48,7 +48,8 @@ def main() -> None:
 
 
 def simulate(arguments: argparse.Namespace) -> None:
-    model, effects = load_model(arguments.model), effects_of(arguments)
+    effects = effects_of(arguments)
+    model = load_model(arguments.model, effects)
     settings = parse_settings(arguments.set) | {"effects": effects}
     recording = read_crash(arguments.bag)
     if not arguments.end > 0.0:

@@ -58,8 +58,8 @@ class DiagnosisNode(Node):
         if not model:
             raise ModelError(f"parameter model is not set: give a .yaml file, or one of {', '.join(ready_models())}")
         self.every_ns = round(every * 1e9)
-        self.structure, self.revision = load_model(model), 0
         self.effects = EFFECTS | (load_effects(effects) if effects else {})
+        self.structure, self.revision = load_model(model, self.effects), 0
         self.bags = [bag for bag in bags if bag]
         for bag in self.bags:
             Kinematics(self.structure, read_bag(bag).test)

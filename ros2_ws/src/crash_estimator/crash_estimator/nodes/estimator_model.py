@@ -25,7 +25,7 @@ class EstimatorModel:
         if effective_mass:
             self.settings["effective_mass"] = True
         self.known_effects = EFFECTS | (load_effects(effects) if effects else {})
-        self.structure, self.revision = load_model(model), 0
+        self.structure, self.revision = load_model(model, self.known_effects), 0
         self.try_out(self.structure)
 
     def estimator(self, structure: Structure, test: Test) -> AnyEstimator:
