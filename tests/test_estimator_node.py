@@ -270,7 +270,7 @@ def test_parameters_that_are_not_finite_are_never_published(stage, model, record
         ([], "parameter model is not set"),
         (["-p", "model:=side_dumy"], "did you mean 'side_dummy'"),
         (["-p", "model:=side_dummy", "-p", "settings:=['forgetting']"], "a setting is written NAME=NUMBER"),
-        (["-p", "model:=side_dummy", "-p", "settings:=forgetting"], "settings"),
+        (["-p", "model:=side_dummy", "-p", "settings:=forgetting"], "a setting is written NAME=NUMBER"),
         (["-p", "model:=side_dummy", "-p", "method:=krls"], "there is no method 'krls'"),
         (["-p", "model:=side_dummy", "-p", "settings:=['forgeting=0.9']"], "no setting 'forgeting'"),
     ],

@@ -203,6 +203,10 @@ def ready_models() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
 
 
+MODEL = f"a .yaml file, or one of {', '.join(ready_models())}"
+"""What a model may be given as."""
+
+
 def model_path(name_or_path: str | Path) -> Path:
     """The file of a ready model by its name, or the path itself."""
     path = Path(name_or_path)

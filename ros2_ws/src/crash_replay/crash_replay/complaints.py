@@ -11,6 +11,7 @@ class Complaints:
     """The first of a kind at once; then, while it goes on, one every few seconds, with how often it has happened."""
 
     def __init__(self, say: Callable[[str], object], clock: Callable[[], float] = time.monotonic):
+        """say: what writes a line; of a logger a function around it, as rclpy's takes one severity per line of code."""
         self.say, self.clock = say, clock
         self.said: dict[str, tuple[float, int]] = {}  # by kind: when last, and how many since
 
