@@ -58,6 +58,10 @@ UNPACKED = Range(0, 4 * 2**30, "bytes", "of a bag: its numbers take a tenth of t
 UNPACKED_SMALL, UNPACKED_RATIO = 16_000_000, 100
 """Bytes to which any bag may unpack, and how many times its size a larger one: what sensors say packs 3 to 20 times."""
 
+# of what is said
+LINE = 1000
+"""Characters of an error, or a little more."""
+
 # of a message
 MESSAGE = Range(0, 64_000_000, "bytes", "a block of 10 000 samples of 800 channels")
 
@@ -68,6 +72,12 @@ def shown(value: Any) -> str:
         return "nothing"
     text = _SHORT.repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def one_line(text: str) -> str:
+    """An error's text as one that a terminal can show, whatever a file or message has put into it."""
+    line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
+    return line if len(line) <= LINE else f"{line[: LINE // 2]} ... {line[-LINE // 2 :]}"
 
 
 class _Short(Repr):
@@ -116,8 +126,10 @@ def times_wrong(seconds: np.ndarray) -> str:
     return f"sample {bad[0]}: time {TIME.wrong(float(seconds[bad[0]]))}" if len(bad) else ""
 
 
-def valid_values(values: np.ndarray) -> np.ndarray:
-    """The values, NaN where one is not finite or beyond what any sensor can mean (VALUE)."""
+def valid_values(values: np.ndarray, factor: float = 1.0) -> np.ndarray:
+    """The values times a factor, NaN where one is not finite or beyond what any sensor can mean (VALUE)."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        values = factor * values
     return np.where(np.abs(values) <= VALUE.highest, values, math.nan)
 
 

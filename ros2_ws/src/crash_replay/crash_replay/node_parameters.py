@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
-from .limits import TEXT, shown
+from .limits import TEXT, one_line, shown
 
 KIND = {str: "a text", bool: "true or false", int: "a whole number", float: "a number", list: "a list of names"}
 OF_EVERY_NODE = ("use_sim_time", "start_type_description_service", "qos_overrides")
@@ -23,6 +23,9 @@ NAME = r"[/~]?[A-Za-z_]\w*(/[A-Za-z_]\w*)*"
 
 class ParameterError(ValueError):
     """A parameter is missing or not what it must be; the message is one readable line."""
+
+    def __init__(self, message: str):
+        super().__init__(one_line(message))
 
 
 class Allowed(NamedTuple):

@@ -28,6 +28,9 @@ SI_UNIT = {
 class RecordingError(ValueError):
     """The data or a file that describes it is at fault; the message is one readable line."""
 
+    def __init__(self, message: str):
+        super().__init__(limits.one_line(message))
+
 
 class Sample(NamedTuple):
     """All channels at one instant."""

@@ -18,6 +18,7 @@ from typing import NoReturn
 
 import numpy as np
 
+from crash_replay.limits import one_line
 from crash_replay.recording import Test
 
 CONTACT_FREQUENCY = 30.0
@@ -34,7 +35,7 @@ class ModelError(ValueError):
     """
 
     def __init__(self, message: str, keys: tuple[str | int, ...] = ()):
-        super().__init__(message)
+        super().__init__(one_line(message))
         self.keys = keys
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from crash_msgs.msg import Samples
 
 from crash_replay.cdr import PLAIN, aligned
-from crash_replay.limits import MESSAGE, TIME, VALUE, count_wrong, most_samples
+from crash_replay.limits import MESSAGE, SAMPLES, TIME, VALUE, count_wrong, most_samples
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import decoded, stamp_ns
 
@@ -50,6 +50,8 @@ def _received(raw: bytes) -> Received:
     (run,) = RUN.unpack_from(raw, at)
     at = aligned(at + 4, 8)
     (number,) = NUMBER.unpack_from(raw, at)
+    if wrong := SAMPLES.wrong(number):  # such a number could not even be answered
+        raise ValueError(f"their number {wrong}")
     time_ns, at = _sequence(raw, at + 8, np.int64)
     values, _ = _sequence(raw, at, np.float64)
     return Received(run, number, sec * 1_000_000_000 + nanosec, time_ns, values)

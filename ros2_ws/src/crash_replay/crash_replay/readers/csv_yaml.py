@@ -67,7 +67,7 @@ def read(path: Path) -> Recording:
             raise RecordingError(f"{beside}: channels.{column}: {error}") from None
         source = f"{path.name}: {column} in {given.unit}" + (", sign turned" if given.sign < 0 else "")
         channels.append(Channel(given.name or column, given.quantity, given.body or "", given.axis or "", source))
-        values.append(limits.valid_values(factor * table[:, columns.index(column)]))
+        values.append(limits.valid_values(table[:, columns.index(column)], factor))
     left_out = [column for column in columns[1:] if column not in description.channels]
     if left_out:
         notes.append(f"left out, not described in {beside.name}: {', '.join(left_out)}")

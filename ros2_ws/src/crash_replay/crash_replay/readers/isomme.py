@@ -144,7 +144,7 @@ def _tracks(files: Sequence[MmeFile]) -> tuple[list[Track], list[str]]:
                 raise RecordingError(f"its status is {status!r}" if status in FAILED else "it has no values")
             unit = file.get("unit")
             channel = channel_of(file.code, f"{file.file.name}: {file.code}, {unit}", several)
-            values = limits.valid_values(si_factor(channel.quantity, unit) * file.values)
+            values = limits.valid_values(file.values, si_factor(channel.quantity, unit))
             tracks.append(Track(file.code, channel, _time_ns(file, by_code), values))
         except RecordingError as why:
             notes.append(f"left out, {file.file.name}: {why}")

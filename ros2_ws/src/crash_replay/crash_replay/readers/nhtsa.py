@@ -132,7 +132,7 @@ def _read_track(header_file: Path, curve: Curve, name: str, body: str) -> Track:
     first = round(index[0])
     if np.any(np.abs(index - first - np.arange(len(index))) > ON_GRID):
         raise Unusable(f"{file.name}: its times are not the header's steps of {curve.step:g} us")
-    values = limits.valid_values(table[:, 1] * si_factor(quantity, curve.unit))
+    values = limits.valid_values(table[:, 1], si_factor(quantity, curve.unit))
     if until:
         ends = min(float(until[1]), limits.TIME.highest * 1e3)  # ms
         values = values[: max(0, round(ends * 1e3 / curve.step) - first)]
