@@ -1,4 +1,4 @@
-.PHONY: help demo test bags thesis benchmark benchmark-effects clean
+.PHONY: help demo test bags thesis benchmark benchmark-effects fuzz clean
 
 help: # what there is to make
 	@sed -n 's/^\([a-z-]*\):.*# /make \1	/p' Makefile
@@ -29,6 +29,9 @@ benchmark: # every promised speed beside its reference, 8 minutes: docs/benchmar
 
 benchmark-effects: # which hidden effects are found, on 1500 simulated tests: docs/missing-effects.md; ARGS="--cases 20"
 	@tools/env python -m crash_estimator.benchmarks.effects $(ARGS)
+
+fuzz: # 20 000 wrong inputs on every way in: docs/fuzz.md; ARGS="--seed 2", or "--replay out/fuzz/FILE" for one that failed
+	@tools/env python -m crash_estimator.fuzz.command $(ARGS)
 
 clean: # removes what the set-up installed and built, and what the programs wrote
 	rm -rf .venv .setup out ros2_ws/build ros2_ws/install ros2_ws/log

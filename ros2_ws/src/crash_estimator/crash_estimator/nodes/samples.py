@@ -34,13 +34,13 @@ def received(raw: bytes) -> Received:
     """
     if wrong := count_wrong("has", len(raw), MESSAGE):
         raise RecordingError(f"does not decode as Samples: {wrong}")
-    if raw[: len(PLAIN)] != PLAIN:  # from a machine of the other byte order
-        message = decoded(raw, Samples)
-        return Received(message.run, message.number, stamp_ns(message.header.stamp), *_arrays_of(message))
     try:
-        return _received(raw)
+        message = _received(raw) if raw[: len(PLAIN)] == PLAIN else _of_the_other_byte_order(raw)
     except (struct.error, ValueError) as error:  # lengths beyond the end
         raise RecordingError(f"does not decode as Samples: {len(raw)} bytes, {error}") from None
+    if wrong := SAMPLES.wrong(message.number):  # not even an answer could be sent to that
+        raise RecordingError(f"the number of the first sample {wrong}")
+    return message
 
 
 def _received(raw: bytes) -> Received:
@@ -50,8 +50,6 @@ def _received(raw: bytes) -> Received:
     (run,) = RUN.unpack_from(raw, at)
     at = aligned(at + 4, 8)
     (number,) = NUMBER.unpack_from(raw, at)
-    if wrong := SAMPLES.wrong(number):  # such a number could not even be answered
-        raise ValueError(f"their number {wrong}")
     time_ns, at = _sequence(raw, at + 8, np.int64)
     values, _ = _sequence(raw, at, np.float64)
     return Received(run, number, sec * 1_000_000_000 + nanosec, time_ns, values)
@@ -68,8 +66,10 @@ def _sequence(raw: bytes, at: int, kind: type) -> tuple[np.ndarray, int]:
     return np.frombuffer(raw, kind, length, at).copy(), at + 8 * length
 
 
-def _arrays_of(message: Samples) -> tuple[np.ndarray, np.ndarray]:
-    return np.array(message.time_ns, dtype=np.int64), np.array(message.values, dtype=np.float64)
+def _of_the_other_byte_order(raw: bytes) -> Received:
+    message = decoded(raw, Samples)
+    time_ns, values = np.array(message.time_ns, dtype=np.int64), np.array(message.values, dtype=np.float64)
+    return Received(message.run, message.number, stamp_ns(message.header.stamp), time_ns, values)
 
 
 def rows_of(message: Samples | Received) -> Rows:
