@@ -89,6 +89,7 @@ BOMB = "X0: &X0 [1,1,1,1,1,1,1,1,1]\n" + "".join(
         ("a: 2001-99-99", "not valid YAML"),
         ("a: " + "1" * 5000, "not valid YAML"),
         ("a: " + "x" * 300_000, "more than the 200000 allowed"),
+        ("channels:\n" + "  a: {b: c, d: e}\n" * 2000, ":3: not valid YAML: key 'a' appears more than once"),
         ("", "found nothing"),
     ],
 )

@@ -50,7 +50,7 @@ MASS = Range(1e-6, 1e9, "kg", "from a milligram to ten large ships")
 # of a file
 YAML_FILE = Range(0, 200_000, "bytes", "a model of a hundred bodies has 10 000")
 YAML_DEPTH = Range(0, 20, "levels", "the deepest key of ours is at the fifth")
-YAML_PARTS = Range(0, 20_000, "parts", "keys and values, an anchor's counted wherever it is used")
+YAML_PARTS = Range(0, 15_000, "parts", "keys and values, an anchor's counted wherever it is used")
 TABLE_FILE = Range(0, 500_000_000, "bytes", "text of a test whose numbers just fit into BYTES")
 CURVE_FILE = Range(0, 100_000_000, "bytes", "text of one channel")
 HEADER_FILE = Range(0, 10_000_000, "bytes", "a header of 1000 curves has 200 000")

@@ -9,15 +9,15 @@ from typing import Any
 
 from ruamel.yaml import YAML, YAMLError
 from ruamel.yaml.events import CollectionEndEvent, CollectionStartEvent, Event
-from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from . import limits
 from .limits import shown
 from .recording import RecordingError
 
 
-class TooLarge(Exception):
-    """A file is too deep, or has too many parts once its anchors are written out."""
+class NotOurs(Exception):
+    """A file is too deep, has too many parts once its anchors are written out, or a key twice."""
 
     def __init__(self, where: Event | Node, problem: str):
         super().__init__(problem)
@@ -34,9 +34,9 @@ def parsed(path: Path) -> tuple[Node | None, Any]:
         tree = yaml.compose(text)
         if tree is None:
             return None, None
-        _check_aliases(tree)
+        _check_tree(tree)
         return tree, yaml.constructor.construct_document(tree)
-    except (YAMLError, TooLarge) as error:
+    except (YAMLError, NotOurs) as error:
         raise RecordingError(f"{path}:{_line_of(error)}: not valid YAML: {_reason(error)}") from None
     except Exception as error:  # what the parser stumbles over: a date that is none, a number of 5000 digits
         raise RecordingError(f"{path}: not valid YAML: {shown(str(error))}") from None
@@ -65,29 +65,40 @@ def _check_nesting(events: Iterator[Event]) -> None:
     for count, event in enumerate(events):
         depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
         if depth > limits.YAML_DEPTH.highest:
-            raise TooLarge(event, f"nested deeper than the {limits.YAML_DEPTH.highest} levels allowed")
+            raise NotOurs(event, f"nested deeper than the {limits.YAML_DEPTH.highest} levels allowed")
         if wrong := limits.count_wrong("has", count, limits.YAML_PARTS):
-            raise TooLarge(event, wrong)
+            raise NotOurs(event, wrong)
 
 
-def _check_aliases(tree: Node) -> None:
+def _check_tree(tree: Node) -> None:
     """Before anything is made of it: nine anchors of nine aliases each are a thousand million parts."""
     sizes: dict[int, int] = {}  # parts, by node; 0 while it is being counted
 
     def parts(node: Node) -> int:
         known = sizes.get(id(node))
         if known == 0:
-            raise TooLarge(node, "an anchor contains itself")
+            raise NotOurs(node, "an anchor contains itself")
         if known is None:
             sizes[id(node)] = 0
             keys = [key for key, _ in node.value] if isinstance(node, MappingNode) else []
+            _check_keys(keys)
             known = 1 + sum(map(parts, keys)) + sum(parts(value) for _, _, value in children(node))
             sizes[id(node)] = known
         if wrong := limits.count_wrong("has", known, limits.YAML_PARTS):
-            raise TooLarge(node, wrong)
+            raise NotOurs(node, wrong)
         return known
 
     parts(tree)
+
+
+def _check_keys(keys: list[Node]) -> None:
+    """A key that stands twice: thousands of them would take the constructor minutes to find."""
+    seen = set()
+    for key in keys:
+        if isinstance(key, ScalarNode):
+            if key.value in seen and key.value != "<<":
+                raise NotOurs(key, f"key {shown(key.value)} appears more than once")
+            seen.add(key.value)
 
 
 def _line_of(error: Exception) -> int:
