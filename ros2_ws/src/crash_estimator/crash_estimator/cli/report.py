@@ -35,7 +35,8 @@ def main() -> None:
 
 
 def report(arguments: argparse.Namespace) -> None:
-    structure = load_model(arguments.model)
+    effects = effects_of(arguments)
+    structure = load_model(arguments.model, effects)
     recording = read_crash(arguments.bag)
     folder = Path(arguments.to)
     if folder.exists() and not folder.is_dir():
@@ -43,7 +44,7 @@ def report(arguments: argparse.Namespace) -> None:
     smooth, said = smoother(recording, arguments.cfc)
     page = write_report(
         recording, structure, list(dict.fromkeys(arguments.methods)), folder, arguments.end, smooth, said,
-        effects=effects_of(arguments),
+        effects=effects,
     )  # fmt: skip
     print(f"{recording.test.id}: {page} and {len(list(folder.glob('*.png')))} figures")
 

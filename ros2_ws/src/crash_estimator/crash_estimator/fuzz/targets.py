@@ -9,7 +9,7 @@ from random import Random
 from typing import NamedTuple
 
 import numpy as np
-from crash_msgs.msg import Samples, TestInfo
+from crash_msgs.msg import TestInfo
 from crash_msgs.srv import AddEffect
 
 from crash_replay.channel_messages import decode
