@@ -1,4 +1,4 @@
-.PHONY: help demo test bags thesis benchmark benchmark-effects chaos endurance clean
+.PHONY: help demo test bags thesis benchmark benchmark-effects chaos endurance fuzz clean
 
 help: # what there is to make
 	@sed -n 's/^\([a-z-]*\):.*# /make \1	/p' Makefile
@@ -35,6 +35,9 @@ chaos: # processes killed, stopped and started again on purpose, 200 runs: docs/
 
 endurance: # a million samples through every method, 500 tests and 500 passes through every node: docs/endurance.md
 	@tools/env python -m crash_estimator.endurance $(ARGS)
+
+fuzz: # 20 000 wrong inputs on every way in: docs/fuzz.md; ARGS="--seed 2", or "--replay out/fuzz/FILE" for one that failed
+	@tools/env python -m crash_estimator.fuzz.command $(ARGS)
 
 clean: # removes what the set-up installed and built, and what the programs wrote
 	rm -rf .venv .setup out ros2_ws/build ros2_ws/install ros2_ws/log

@@ -218,7 +218,7 @@ def test_a_pass_that_begins_again_knows_nothing_of_later_samples(damped):
 def test_samples_are_kept_by_number_whatever_order_they_come_in(damped):
     recording = damped[2]
     rows = Rows(0, recording.time_ns, recording.values)
-    kept = Kept(recording.test, expected=10)
+    kept = Kept(recording.test)
     kept.put_rows(rows.without(100).first(100))
     assert (kept.missing(200), kept.missing(150), kept.gap(0, 200)) == (100, 100, (0, 100))
     kept.put_rows(rows.first(120))

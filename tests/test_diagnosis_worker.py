@@ -68,7 +68,8 @@ def test_a_fault_in_a_users_effect_is_told_by_its_name_and_the_process_lives(dam
     try:
         assert _reply(worker, ready=True) is None
         worker.ask(Task(model, recording, final=True))
-        assert _reply(worker).error == "the diagnosis failed: ZeroDivisionError: division by zero"
+        failed = f"{path}: force of 'stick' fails on a motion it was tried on: ZeroDivisionError: division by zero"
+        assert _reply(worker).error == failed
         assert worker.process.poll() is None
     finally:
         worker.close()

@@ -191,12 +191,11 @@ def test_every_message_is_answered_whatever_becomes_of_it(stage, model, recordin
 def test_samples_of_another_test_are_left_out_with_an_error(stage, model, recording, capfd):
     stage.add_estimator(model=model)
     stage.send_test(recording)
-    stage.samples.publish(empty_samples(0, [1.0, 2.0]))
-    stage.samples.publish(empty_samples(0, []))
+    for _ in range(50):
+        stage.samples.publish(empty_samples(0, [1.0, 2.0]))
     stage.spin(0.2)
     said = capfd.readouterr().err
-    assert "samples from number 0: expected 3 values (3 channels), found 2: left out" in said
-    assert "expected 3 values (3 channels), found 0: left out" in said
+    assert said.count("samples from number 0: expected 3 values (3 channels), found 2: left out") == 1, "a flood"
     stage.send(recording, block=10)
     assert_same(stage.wait_for("estimator", 35), offline(model, recording, "constrained_kalman"))
 
@@ -270,7 +269,7 @@ def test_parameters_that_are_not_finite_are_never_published(stage, model, record
         ([], "parameter model is not set"),
         (["-p", "model:=side_dumy"], "did you mean 'side_dummy'"),
         (["-p", "model:=side_dummy", "-p", "settings:=['forgetting']"], "a setting is written NAME=NUMBER"),
-        (["-p", "model:=side_dummy", "-p", "settings:=forgetting"], "settings"),
+        (["-p", "model:=side_dummy", "-p", "settings:=forgetting"], "a setting is written NAME=NUMBER"),
         (["-p", "model:=side_dummy", "-p", "method:=krls"], "there is no method 'krls'"),
         (["-p", "model:=side_dummy", "-p", "settings:=['forgeting=0.9']"], "no setting 'forgeting'"),
     ],

@@ -41,7 +41,7 @@ def rows_of(recording: Recording, start: int, stop: int) -> Rows:
 
 def follower_of(recording: Recording, method: str = "mrls", **more) -> Follower:
     estimator = make_estimator(oscillator(ESTIMATED, **DAMPED), recording.test, method, **more)
-    return Follower(estimator, Kept(recording.test, len(recording)))
+    return Follower(estimator, Kept(recording.test))
 
 
 def take(follower: Follower, recording: Recording, start: int, stop: int):

@@ -162,7 +162,7 @@ MISTAKES = [
     ("unit: kN, ", "", "t.yaml:4: key 'unit' is missing in channels.barrier_fx"),
     ("sign: -1", "sign: 2", "t.yaml:3: channels.rib_ay.sign: should be 1 or -1, found 2"),
     ("axis: y", "axis: w", "t.yaml:3: channels.rib_ay.axis: should be 'x', 'y', 'z' or '', found 'w'"),
-    ("rib: 0.5", "rib: .nan", "t.yaml:6: initial_velocity.rib: should be a finite number, found nan"),
+    ("rib: 0.5", "rib: .nan", "t.yaml:6: initial_velocity.rib: must be a number from -10000 to 10000 m/s, got nan"),
     ("time,", "t,", "t.csv:1: expected a header of comma-separated names, the first `time` (in s), found 't,rib_ay"),
     (",barrier_fx,", ",rib_ay,", "t.csv:1: column 'rib_ay' appears more than once"),
     ("0.0,1.0,10,", "0.0,1.0,1O,", "t.csv:3: column 'barrier_fx': expected a number or an empty cell, found '1O'"),

@@ -124,7 +124,7 @@ def test_a_velocity_with_its_unit_and_doubled_names(tmp_path):
         ),
         (
             channel_file("10VEHC000000ACXP", [1, 2], sampling_interval="0"),
-            "its time does not increase from sample to sample",
+            "'sampling interval' must be a number from 1e-09 to 10 s, got 0.0",
         ),
         (
             channel_file("10VEHC000000ACXP", [1], reference_channel="explicit"),

@@ -120,7 +120,7 @@ def test_what_is_given_later_is_the_same(method):
 def test_to_give_it_later_takes_no_memory_but_that_of_a_state():
     recording = oscillator_recording(n=1950)
     estimator = make_estimator(oscillator(), recording.test, "constrained_kalman")
-    follower = Follower(estimator, Kept(recording.test, len(recording)))
+    follower = Follower(estimator, Kept(recording.test))
     rows = Rows(0, recording.time_ns, recording.values)
     follower.keep(rows)
     _, size = follower.follow(rows).later(FIELDS)

@@ -32,24 +32,48 @@ class Rows(NamedTuple):
             yield Sample(self.number + k, time_ns, values)
 
 
-class Kept:
-    """Grows with what it is given; a sample that comes again replaces itself."""
+AT_FIRST = 4096
+"""Samples that there is room for from the beginning."""
 
-    def __init__(self, test: Test, expected: int = 0):
-        """expected: samples in the whole recording, where that is known."""
+
+class Kept:
+    """Grows with what it is given, not with what is said to come; a sample that comes again replaces itself."""
+
+    def __init__(self, test: Test):
         self.test = test
         self.seen = np.zeros(0, dtype=bool)
         self.time_ns = np.zeros(0, dtype=np.int64)
         self.values = np.zeros((0, len(test.channels)))
-        self._grow(max(expected, 1))
+        self.end = 0  # number after the last that has been seen
+        self._grow(AT_FIRST)
 
     def put_rows(self, rows: Rows) -> None:
         first, end = rows.number, rows.end
         if end > len(self.seen):
             self._grow(max(end, 2 * len(self.seen)))
+        self.end = max(self.end, end)
         self.seen[first:end] = True
         self.time_ns[first:end] = rows.time_ns
         self.values[first:end] = rows.values
+
+    def agrees(self, number: int, time_ns: np.ndarray) -> bool:
+        """Whether these may be the times of samples number, number + 1, ..., by those that have been seen.
+
+        time_ns: (k,) increasing. Samples of another test, or of one whose clock went wrong, do not.
+        """
+        end = number + len(time_ns)
+        before = self.seen[: min(number, self.end)][::-1]
+        if len(before):
+            last = len(before) - 1 - int(before.argmax())  # which stops at the first, mostly at once
+            if self.seen[last] and self.time_ns[last] >= time_ns[0]:
+                return False
+        if number >= self.end:
+            return True
+        there = self.seen[number : min(end, self.end)]
+        if not np.array_equal(self.time_ns[number : number + len(there)][there], time_ns[: len(there)][there]):
+            return False
+        after = self.seen[end : self.end]
+        return not len(after) or bool(self.time_ns[end + int(after.argmax())] > time_ns[-1])
 
     def gap(self, start: int, end: int) -> tuple[int, int] | None:
         """The first samples of number start, ..., end - 1 that have not been seen: start, stop. None: all have."""
@@ -87,7 +111,10 @@ class Kept:
         return Recording(self.test, self.time_ns[there], self.values[there])
 
     def _grow(self, length: int) -> None:
-        more = length - len(self.seen)
-        self.seen = np.concatenate([self.seen, np.zeros(more, dtype=bool)])
-        self.time_ns = np.concatenate([self.time_ns, np.zeros(more, dtype=np.int64)])
-        self.values = np.concatenate([self.values, np.zeros((more, self.values.shape[1]))])
+        """Zeros that are made, not copied, take no memory until they are written to."""
+        old, have = (self.seen, self.time_ns, self.values), len(self.seen)
+        self.seen = np.zeros(length, dtype=bool)
+        self.time_ns = np.zeros(length, dtype=np.int64)
+        self.values = np.zeros((length, self.values.shape[1]))
+        for new, before in zip((self.seen, self.time_ns, self.values), old):
+            new[:have] = before

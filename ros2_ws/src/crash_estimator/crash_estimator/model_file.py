@@ -1,35 +1,47 @@
 """Model files: YAML -> Structure. The keys are those of the README's table; nothing in a file is executed."""
 
+from collections.abc import Mapping
 from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
-from crash_replay.yaml_schema import load_yaml
+from crash_replay.limits import MASS, NUMBER, Range
+from crash_replay.yaml_schema import Text, number, read_yaml
 
+from .core.effects.base import Effect
+from .core.effects.targets import check_effects
 from .core.structure import Body, Coefficient, EffectSpec, Element, ModelError, Structure, Term
 
 
-class Part(BaseModel):
-    """A mapping of the file: unknown keys are errors, and so are numbers that are not finite."""
+MOST_PARTS = 100
+"""Bodies, elements or effects: the work on a sample grows with the square of them and more."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+Number = number(NUMBER)
+Positive = number(Range(1e-30, NUMBER.highest, "", "above 0, and so that its inverse is a number too"))
+NotNegative = number(Range(0.0, NUMBER.highest, "", "0 has a meaning"))
+
+
+class Part(BaseModel):
+    """A mapping of the file: unknown keys are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class CoefficientPart(Part):
     """`stiffness: 2.0e6` (known), or `stiffness: {estimate: true, initial: 5.0e5, min: 0.0}`."""
 
-    estimate: bool = False
-    value: float | None = None
-    initial: float | None = None
-    std: PositiveFloat | None = None
-    min: float | None = None
-    max: float | None = None
+    estimate: StrictBool = False
+    value: Number | None = None
+    initial: Number | None = None
+    std: Positive | None = None
+    min: Number | None = None
+    max: Number | None = None
     shape: Literal["curve", "constant"] = "curve"
-    drift: NonNegativeFloat | None = None
+    drift: NotNegative | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -66,12 +78,12 @@ class CoefficientPart(Part):
 
 
 class BodyPart(Part):
-    mass: PositiveFloat | None = None  # kg
-    acceleration: str | tuple[str, ...] = ()
-    motion: str | tuple[str, ...] | None = None
-    fixed: bool = False
-    force: str | None = None
-    noise: PositiveFloat | None = None  # m/s^2, or N for a measured force
+    mass: number(MASS) | None = None  # kg
+    acceleration: Text | tuple[Text, ...] = ()
+    motion: Text | tuple[Text, ...] | None = None
+    fixed: StrictBool = False
+    force: Text | None = None
+    noise: Positive | None = None  # m/s^2, or N for a measured force
 
     @model_validator(mode="after")
     def _one_kind(self):
@@ -97,15 +109,15 @@ class BodyPart(Part):
 
 
 class ElementPart(Part):
-    between: tuple[str, str]
+    between: tuple[Text, Text]
     stiffness: CoefficientPart
     damping: CoefficientPart = CoefficientPart(value=0.0)
     tension: Literal["none", "both"] = "both"
-    unloading: PositiveFloat | CoefficientPart | None = None  # N/m; or {estimate: true, initial: ...}
+    unloading: Positive | CoefficientPart | None = None  # N/m; or {estimate: true, initial: ...}
     crush_terms: dict[int, CoefficientPart] = {}  # power of the crush, 2 or more -> N/m^power
     rate_terms: dict[int, CoefficientPart] = {}  # power of the rate, 2 or more -> N (s/m)^power
-    displacement: str | None = None
-    velocity: str | None = None
+    displacement: Text | None = None
+    velocity: Text | None = None
 
     @model_validator(mode="after")
     def _checks(self):
@@ -144,16 +156,16 @@ class ElementPart(Part):
 class EffectPart(Part):
     """`{type: coulomb_friction, element: door_rib}`; what the target is depends on the type."""
 
-    type: str
-    element: str | None = None
-    body: str | None = None
-    channel: str | None = None
-    between: tuple[str, str] | None = None
-    coefficient: float | None = None
-    shape: dict[str, float] = {}
-    host: str | None = None
-    touches: str | None = None
-    taken_from: str | None = None
+    type: Text
+    element: Text | None = None
+    body: Text | None = None
+    channel: Text | None = None
+    between: tuple[Text, Text] | None = None
+    coefficient: Number | None = None
+    shape: dict[Text, Positive] = {}
+    host: Text | None = None
+    touches: Text | None = None
+    taken_from: Text | None = None
     variant: Literal["", "absolute", "one_way", "one_way_back"] = ""
 
     @model_validator(mode="after")
@@ -171,10 +183,10 @@ class EffectPart(Part):
 
 
 class ModelFile(Part):
-    name: str = Field(min_length=1)
-    bodies: dict[str, BodyPart] = Field(min_length=1)
-    elements: dict[str, ElementPart] = Field(min_length=1)
-    effects: list[EffectPart] = []
+    name: Text = Field(min_length=1)
+    bodies: dict[Text, BodyPart] = Field(min_length=1, max_length=MOST_PARTS)
+    elements: dict[Text, ElementPart] = Field(min_length=1, max_length=MOST_PARTS)
+    effects: list[EffectPart] = Field([], max_length=MOST_PARTS)
 
     def structure(self) -> Structure:
         return Structure(
@@ -189,6 +201,10 @@ def ready_models() -> dict[str, Path]:
     """The models that ship with the package, by name."""
     folder = Path(str(files("crash_estimator") / "models"))
     return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+MODEL = f"a .yaml file, or one of {', '.join(ready_models())}"
+"""What a model may be given as."""
 
 
 def model_path(name_or_path: str | Path) -> Path:
@@ -207,13 +223,17 @@ def model_path(name_or_path: str | Path) -> Path:
     return ready[str(name_or_path)]
 
 
-def load_model(name_or_path: str | Path) -> Structure:
+def load_model(name_or_path: str | Path, effects: Mapping[str, Effect] | None = None) -> Structure:
     """A ready model by its name, or a model file by its path.
 
-    Raises ModelError with one line that names the file, the line and the key.
+    effects: those that it may name; None: they are left to whoever puts them to work.
+    Raises ModelError or RecordingError with one line that names the file, the line and the key.
     """
-    path = model_path(name_or_path)
+    read = read_yaml(model_path(name_or_path), ModelFile)
     try:
-        return load_yaml(path, ModelFile).structure()
+        structure = read.content.structure()
+        if effects is not None:
+            check_effects(structure, effects)
     except ModelError as error:
-        raise ModelError(f"{path}: {error}") from None
+        raise ModelError(f"{read.place(error.keys)}: {error}") from None
+    return structure

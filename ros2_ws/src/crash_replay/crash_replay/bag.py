@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from . import limits
 from .bag_contents import Topic, bag_files, read_topics
 from .bag_writer import LATCHED, STREAM, TopicToWrite, write_mcap, write_metadata
 from .channel_messages import CARRIERS, SECOND, decode, encode
@@ -102,7 +103,7 @@ def read_bag(path: str | Path, recover: bool = False) -> Recording:
     Raises RecordingError with one line that names the file, the topic and what to do.
     """
     path = Path(path)
-    topics, broken = read_topics(bag_files(path))
+    topics, broken = read_topics(bag_files(path), lambda topic: topic.startswith((TEST_TOPIC, CHANNEL_TOPICS)))
     if broken and not (recover and TEST_TOPIC in topics):
         way_out = (
             f"`import {path} --recover --to NEW` copies what is intact" if TEST_TOPIC in topics else "nothing is intact"
@@ -128,7 +129,14 @@ def read_bag(path: str | Path, recover: bool = False) -> Recording:
     stamps, values = _align(path, kept, columns, notes)
     if len(stamps) < expected:
         notes.append(f"{len(stamps)} of the {expected} samples that the test had are in the bag")
-    return Recording(replace(test, channels=tuple(kept), notes=test.notes + tuple(notes)), stamps - time_zero, values)
+    try:
+        test = replace(test, channels=tuple(kept), notes=test.notes + tuple(notes))
+        recording = Recording(test, stamps - time_zero, values)
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from None
+    if not recording.has_values:
+        raise RecordingError(f"{path}: no channel has a valid value at any sample: there is nothing in it to use")
+    return recording
 
 
 def _read_test(path: Path, topics: dict[str, Topic]) -> tuple[Test, int, int]:
@@ -172,6 +180,8 @@ def _align(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Stamps that any channel has (n,) int64 ns, and the values (n, channels), NaN where a channel has none."""
     stamps = np.unique(np.concatenate([columns[channel.name][0] for channel in channels]))
+    if wrong := limits.size_wrong(len(stamps), len(channels)):
+        raise RecordingError(f"{path}: {wrong}")
     values = np.full((len(stamps), len(channels)), np.nan)
     lost: dict[int, list[str]] = {}
     for k, channel in enumerate(channels):

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from . import limits
 from .message_types import typestore
 from .recording import Channel, RecordingError
 
@@ -65,15 +66,16 @@ def encode(channel: Channel, stamps_ns: np.ndarray, values: np.ndarray) -> list[
 
 
 def decode(channel: Channel, messages: list[bytes]) -> tuple[np.ndarray, np.ndarray]:
-    """Stamps (n,) int64 ns and values (n,) SI of a topic's messages, in their order."""
+    """Stamps (n,) int64 ns and values (n,) SI of a topic's messages, in their order; NaN for what is no valid value."""
     offset = _tail_offset(channel)
-    if any(len(message) < FRONT + offset or message[1] != 1 for message in messages):
+    if any(not FRONT + offset <= len(message) <= limits.MESSAGE.highest or message[1] != 1 for message in messages):
         raise RecordingError(f"expected {CARRIERS[channel.quantity].type} as little-endian CDR, found other bytes")
     layout = np.dtype([("sec", "<i4"), ("nanosec", "<u4"), ("value", "<f8")])
     # from the front and from the end: a frame_id of any length may stand between
     packed = b"".join(m[4:12] + m[len(m) - offset : len(m) - offset + 8] for m in messages)
     fields = np.frombuffer(packed, layout)
-    return fields["sec"].astype(np.int64) * SECOND + fields["nanosec"], fields["value"].astype(float)
+    stamps = fields["sec"].astype(np.int64) * SECOND + fields["nanosec"]
+    return stamps, limits.valid_values(fields["value"].astype(float))
 
 
 def _blank(channel: Channel) -> Any:

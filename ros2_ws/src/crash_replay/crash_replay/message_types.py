@@ -2,11 +2,13 @@
 
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from . import limits
 from .recording import Channel, Recording, RecordingError, Test
 
 
@@ -62,18 +64,47 @@ def encode_test(recording: Recording, time_zero_ns: int) -> memoryview:
 
 def decode_test(data: bytes) -> tuple[Test, int, int]:
     """The test, the stamp of its impact in ns, and how many samples it had."""
+    if wrong := limits.count_wrong("has", len(data), limits.MESSAGE):
+        raise RecordingError(wrong)
     try:
         message = typestore().deserialize_cdr(data, "crash_msgs/msg/TestInfo")
     except Exception as error:  # whatever the bytes make the decoder stumble over
         raise RecordingError(f"does not decode as crash_msgs/msg/TestInfo of this version ({error})") from None
-    channels = tuple(Channel(c.name, c.quantity, c.body, c.axis, c.source) for c in message.channels)
-    test = Test(
+    return test_from_msg(message), message.time_zero.sec * 1_000_000_000 + message.time_zero.nanosec, message.samples
+
+
+def test_from_msg(message: Any) -> Test:
+    """The test that a TestInfo, rclpy's or one from a bag, tells of. Raises RecordingError where that cannot be."""
+    if wrong := _what_is_wrong(message):
+        raise RecordingError(f"test {limits.shown(message.id)}: {wrong}")
+    bodies = message.bodies
+    return Test(
         message.id,
-        channels,
+        tuple(Channel(c.name, c.quantity, c.body, c.axis, c.source) for c in message.channels),
         message.title,
         message.source,
-        dict(zip(message.bodies, message.initial_velocity.tolist())),
-        dict(zip(message.bodies, message.initial_displacement.tolist())),
+        dict(zip(bodies, map(float, message.initial_velocity))),
+        dict(zip(bodies, map(float, message.initial_displacement))),
         tuple(message.notes),
     )
-    return test, message.time_zero.sec * 1_000_000_000 + message.time_zero.nanosec, message.samples
+
+
+test_from_msg.__test__ = False  # not a pytest function
+
+
+def _what_is_wrong(message: Any) -> str:
+    """With what a TestInfo claims; "" for nothing."""
+    bodies, velocities, displacements = map(len, (message.bodies, message.initial_velocity, message.initial_displacement))
+    if not bodies == velocities == displacements or len(set(message.bodies)) != bodies:
+        return (
+            "expected an initial velocity and displacement for each of different bodies, found "
+            f"{bodies} bodies, {velocities} velocities, {displacements} displacements"
+        )
+    if wrong := limits.size_wrong(message.samples, len(message.channels)):
+        return wrong
+    single = message.samples == 1 and message.sample_period == 0.0
+    if not single and (wrong := limits.PERIOD.wrong(message.sample_period)):
+        return f"sample_period {wrong}"
+    if wrong := limits.STAMP.wrong(message.time_zero.sec):
+        return f"time_zero {wrong}"
+    return ""

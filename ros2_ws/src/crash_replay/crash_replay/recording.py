@@ -4,6 +4,7 @@ Pure data: no file format and no ROS here. Readers make recordings (`readers/`),
 them, the nodes and commands fold them through estimators sample by sample.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -11,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from . import limits
 from .fault import Fault
 from .foreign_text import visible
 
@@ -85,10 +87,28 @@ class Test:
         for by_body in ("initial_velocity", "initial_displacement"):
             object.__setattr__(self, by_body, {visible(body): value for body, value in getattr(self, by_body).items()})
         object.__setattr__(self, "notes", tuple(map(visible, self.notes)))
-        names = [channel.name for channel in self.channels]
-        doubled = sorted({name for name in names if names.count(name) > 1})
+        doubled = [name for name, count in Counter(self.channel_names).items() if count > 1]
         if doubled:
-            raise RecordingError(f"test {self.id}: channel {doubled[0]} appears more than once")
+            raise RecordingError(f"test {self._shown}: channel {min(doubled)} appears more than once")
+        if wrong := self._what_is_wrong():
+            raise RecordingError(f"test {self._shown}: {wrong}")
+
+    def _what_is_wrong(self) -> str:
+        """Of the numbers and texts."""
+        for what, motion, limit in (
+            ("initial velocity", self.initial_velocity, limits.VELOCITY),
+            ("initial displacement", self.initial_displacement, limits.DISPLACEMENT),
+        ):
+            for body, value in motion.items():
+                if wrong := limit.wrong(value):
+                    return f"{what} of {limits.shown(body)} {wrong}"
+        of_channels = (text for c in self.channels for text in (c.name, c.body, c.source))
+        texts = (self.id, self.title, self.source, *of_channels, *self.initial_velocity, *self.notes)
+        return limits.count_wrong("has", len(self.channels), limits.CHANNELS) or limits.text_wrong(texts)
+
+    @property
+    def _shown(self) -> str:
+        return self.id if len(self.id) <= 60 else limits.shown(self.id)
 
     @property
     def channel_names(self) -> tuple[str, ...]:
@@ -122,6 +142,9 @@ class Recording:
             raise RecordingError(f"test {self.test.id}: values must have shape {expected}, got {self.values.shape}")
         if not len(self.time_ns):
             raise RecordingError(f"test {self.test.id} has no samples")
+        wrong = limits.size_wrong(*expected) or limits.times_wrong(self.time_ns[[0, -1]] * 1e-9)
+        if wrong:
+            raise RecordingError(f"test {self.test.id}: {wrong}")
         backwards = np.flatnonzero(np.diff(self.time_ns) <= 0)
         if len(backwards):
             k = int(backwards[0]) + 1
@@ -132,6 +155,11 @@ class Recording:
 
     def __len__(self) -> int:
         return len(self.time_ns)
+
+    @property
+    def has_values(self) -> bool:
+        """Whether any channel has a valid value anywhere."""
+        return bool(np.isfinite(self.values).any())
 
     @property
     def time(self) -> np.ndarray:

@@ -24,10 +24,11 @@ from .console import Console, wanted
 from .fault import guarded, tell
 from .health import HealthReport
 from .middleware import prepare_middleware
+from .node_parameters import ParameterError, checked, declare_parameters, names_in
 from .pacing import Outcome, Pacing
 from .player import SECOND, CommandError, Player
 from .replay_health import replay_health
-from .replay_parameters import LIVE, ParameterError, checked, declare_parameters, names_in, window_of
+from .replay_parameters import LIVE, PARAMETERS, window_of
 from .replay_topics import ReplayTopics
 from .ros_runtime import spin
 from .said import say
@@ -40,7 +41,7 @@ class ReplayNode(Node):
 
     def __init__(self) -> None:
         super().__init__("replay", automatically_declare_parameters_from_overrides=True)
-        self.asked = declare_parameters(self)
+        self.asked = declare_parameters(self, PARAMETERS, LIVE)
         asked = self.asked
         recording = select_channels(read_bag(asked["bag"]), names_in(asked["channels"]), names_in(asked["exclude"]))
         window = samples_within(window_of(asked), recording.time_ns)
@@ -119,7 +120,7 @@ class ReplayNode(Node):
     def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
         """Follow a change of what may be changed at any time; nothing of it where one part cannot be."""
         try:
-            new = {p.name: checked(p.name, p.value) for p in parameters if p.name in LIVE}
+            new = {p.name: checked(PARAMETERS, p.name, p.value) for p in parameters if p.name in LIVE}
             asked = self.asked | new
             window = samples_within(window_of(asked), self.pacing.player.time_ns)
         except (ParameterError, SelectionError) as error:

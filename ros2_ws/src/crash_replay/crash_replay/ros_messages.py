@@ -1,15 +1,19 @@
 """Recordings as ROS messages and back: where rclpy's types and ours meet."""
 
 from array import array
+from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
 from crash_msgs.msg import ChannelInfo, Samples, TestInfo
 from geometry_msgs.msg import AccelStamped, PointStamped, TwistStamped, WrenchStamped
+from rclpy.serialization import deserialize_message
 
+from . import limits
 from .bag import time_zero_ns
 from .channel_messages import CARRIERS, component, frame_id
-from .recording import Channel, Recording, RecordingError, Sample, Test
+from .message_types import test_from_msg as test_from_msg  # also of a bag
+from .recording import Channel, Recording, RecordingError, Sample
 
 SECOND = 1_000_000_000
 ChannelMessage = AccelStamped | PointStamped | TwistStamped | WrenchStamped
@@ -57,19 +61,18 @@ def test_to_msg(recording: Recording) -> TestInfo:
     )
 
 
-def test_from_msg(message: TestInfo) -> Test:
-    return Test(
-        message.id,
-        tuple(Channel(c.name, c.quantity, c.body, c.axis, c.source) for c in message.channels),
-        message.title,
-        message.source,
-        dict(zip(message.bodies, message.initial_velocity)),
-        dict(zip(message.bodies, message.initial_displacement)),
-        tuple(message.notes),
-    )
+def decoded(data: bytes, kind: type) -> Any:
+    """The message in the bytes that came for it; raises RecordingError where they are something else."""
+    wrong = limits.count_wrong("has", len(data), limits.MESSAGE)
+    try:
+        if not wrong:
+            return deserialize_message(data, kind)
+    except Exception as error:  # whatever the bytes make the decoder stumble over
+        wrong = f"{type(error).__name__} in its {len(data)} bytes"
+    raise RecordingError(f"does not decode as {kind.__name__}: {wrong}")
 
 
-test_to_msg.__test__ = test_from_msg.__test__ = False  # not pytest functions
+test_to_msg.__test__ = False  # not a pytest function
 
 
 def samples_to_msg(recording: Recording, start: int, stop: int, run: int, time_zero: int) -> Samples:

@@ -1,25 +1,59 @@
-"""YAML files checked against a pydantic model; what is wrong is said in one line with file, line and key.
+"""YAML files checked against a pydantic model; what is wrong is said in one line with file, line and key."""
 
-Reading is safe: a file is data, tags that would construct objects are refused.
-"""
-
-from collections.abc import Iterator
+from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, NamedTuple, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
-from ruamel.yaml import YAML, YAMLError
-from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ValidationError
+from ruamel.yaml.nodes import Node, SequenceNode
 
-from .foreign_text import visible
+from . import limits
+from .limits import Range, shown
 from .recording import RecordingError
+from .yaml_tree import children, parsed
 
 Model = TypeVar("Model", bound=BaseModel)
 
 WORDING = {"missing": "has too few items", "model_type": "should be a mapping", "dict_type": "should be a mapping"}
 """pydantic's error types that it words in Python's terms."""
+
+
+def number(limit: Range) -> Any:
+    """The type of a key that takes a number within a limit: not text, nor `true`, which Python counts as 1."""
+
+    def checked(value: Any) -> Any:
+        if wrong := limit.wrong(value):
+            raise ValueError(wrong)
+        return value
+
+    return Annotated[float, BeforeValidator(checked)]
+
+
+Text = Annotated[str, AfterValidator(lambda text: _checked_text(text))]
+"""The type of a key that takes a text: of one line that can be shown."""
+
+
+def _checked_text(text: str) -> str:
+    if wrong := limits.text_wrong([text]):
+        raise ValueError(wrong)
+    if not text.isprintable():
+        raise ValueError(f"must be text of one line without control characters, found {shown(text)}")
+    return text
+
+
+class Read(NamedTuple):
+    """A YAML file that has been read: as an instance of its model, and where its keys are."""
+
+    path: Path
+    content: Any
+    tree: Node
+
+    def place(self, keys: Sequence[Any]) -> str:
+        """ "door.yaml:7: elements.door_rib.between", of the last of `keys` that the file has."""
+        found = _keys(self.tree, tuple(keys))
+        return f"{self.path}:{_line(self.tree, found)}: {'.'.join(map(str, found)) or 'the file'}"
 
 
 def load_yaml(path: str | Path, model: type[Model]) -> Model:
@@ -28,21 +62,17 @@ def load_yaml(path: str | Path, model: type[Model]) -> Model:
     Raises RecordingError with one line, for instance
     "door.yaml:7: unknown key 'stifness' in elements.door_rib; did you mean 'stiffness'?".
     """
+    return read_yaml(path, model).content
+
+
+def read_yaml(path: str | Path, model: type[Model]) -> Read:
+    """As `load_yaml`, for one who finds more wrong with it later and is to say where."""
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise RecordingError(f"{path}: cannot be read as a YAML text file ({_reason(error)})") from None
-    try:
-        # pure: the C loader reads YAML 1.1, in which the axis `y` is a truth value
-        tree = YAML(typ="safe", pure=True).compose(text)
-        data = _printable(YAML(typ="safe", pure=True).load(text))
-    except YAMLError as error:
-        raise RecordingError(f"{path}:{_line_of(error)}: not valid YAML: {_reason(error)}") from None
+    tree, data = parsed(path)
     if not isinstance(data, dict):
-        raise RecordingError(f"{path}:1: expected a mapping with {', '.join(model.model_fields)}; found {_shown(data)}")
+        raise RecordingError(f"{path}:1: expected a mapping with {', '.join(model.model_fields)}; found {shown(data)}")
     try:
-        return model.model_validate(data)
+        return Read(path, model.model_validate(data), tree)
     except ValidationError as invalid:
         # a union reports each of its members: the deepest error belongs to the one that was meant
         error = max(
@@ -52,26 +82,17 @@ def load_yaml(path: str | Path, model: type[Model]) -> Model:
         raise RecordingError(_message(path, tree, model, error)) from None
 
 
-def _printable(value: Any) -> Any:
-    """The same with texts and keys that can be printed, whatever escapes the file has in its quotes."""
-    if isinstance(value, str):
-        return visible(value.strip())
-    if isinstance(value, dict):
-        return {_printable(key): _printable(item) for key, item in value.items()}
-    return [_printable(item) for item in value] if isinstance(value, list) else value
-
-
 def _message(path: Path, tree: Node, model: type[BaseModel], error: dict[str, Any]) -> str:
     """One line for one of pydantic's errors."""
     keys = _keys(tree, error["loc"])
     place = f"{path}:{_line(tree, keys)}"
     if error["type"] == "extra_forbidden":
         known = [name for owner in _models_at(model, keys[:-1]) for name in owner.model_fields]
-        return f"{place}: unknown key {keys[-1]!r}{_within(keys[:-1])}; {suggestion(keys[-1], known)}"
+        return f"{place}: unknown key {shown(keys[-1])}{_within(keys[:-1])}; {suggestion(keys[-1], known)}"
     if error["type"] == "missing" and isinstance(error["loc"][-1], str):
         return f"{place}: key {error['loc'][-1]!r} is missing{_within(keys)}"
     what = WORDING.get(error["type"], error["msg"].removeprefix("Value error, ").removeprefix("Input "))
-    found = "" if error["type"] == "value_error" else f", found {_shown(error['input'])}"
+    found = "" if error["type"] == "value_error" else f", found {shown(error['input'])}"
     return f"{place}: {'.'.join(map(str, keys)) or 'the file'}: {what}{found}"
 
 
@@ -81,19 +102,11 @@ def suggestion(name: Any, known: list[str]) -> str:
     return f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(dict.fromkeys(known)) or 'none'}"
 
 
-def _children(node: Node) -> Iterator[tuple[Any, Node, Node]]:
-    """(key, node that shows its line, value) of a mapping or sequence."""
-    if isinstance(node, MappingNode):
-        yield from ((key.value, key, value) for key, value in node.value)
-    elif isinstance(node, SequenceNode):
-        yield from ((index, value, value) for index, value in enumerate(node.value))
-
-
 def _keys(tree: Node, location: tuple[Any, ...]) -> list[Any]:
     """The part of pydantic's location that is in the file: without names of union members and missing keys."""
     keys, node = [], tree
     for part in location:
-        for key, _, value in _children(node):
+        for key, _, value in children(node):
             if key == (part if isinstance(node, SequenceNode) else str(part)):
                 keys.append(key)
                 node = value
@@ -105,7 +118,7 @@ def _line(tree: Node, keys: list[Any]) -> int:
     """Line of the last of `keys`, counted from 1."""
     line, node = tree.start_mark.line, tree
     for part in keys:
-        for key, shown_by, value in _children(node):
+        for key, shown_by, value in children(node):
             if key == part:
                 line, node = shown_by.start_mark.line, value
                 break
@@ -131,18 +144,3 @@ def _models_at(annotation: Any, keys: list[Any]) -> list[type[BaseModel]]:
 
 def _within(keys: list[Any]) -> str:
     return f" in {'.'.join(map(str, keys))}" if keys else ""
-
-
-def _shown(value: Any) -> str:
-    text = "nothing" if value is None else repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _line_of(error: Exception) -> int:
-    mark = getattr(error, "problem_mark", None)
-    return mark.line + 1 if mark else 1
-
-
-def _reason(error: Exception) -> str:
-    text = getattr(error, "problem", None) or getattr(error, "strerror", None) or str(error)
-    return " ".join(text.split())

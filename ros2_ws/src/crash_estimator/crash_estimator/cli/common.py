@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from crash_replay.bag import read_bag
+from crash_replay.limits import NUMBER
 from crash_replay.output import check_outputs, write_text
 from crash_replay.recording import Recording, RecordingError
 
@@ -57,6 +58,8 @@ def parse_settings(pairs: list[str]) -> dict[str, float | int | bool]:
             value: float | int | bool = text == "true" if text in ("true", "false") else float(text)
         except ValueError:
             raise ModelError(f"a setting is written NAME=NUMBER, such as forgetting=0.98, got {pair!r}") from None
+        if wrong := NUMBER.wrong(value) if isinstance(value, float) else "":
+            raise ModelError(f"setting {name.strip()} {wrong}")
         settings[name.strip()] = (
             int(value) if isinstance(value, float) and text.strip().lstrip("+-").isdigit() else value
         )

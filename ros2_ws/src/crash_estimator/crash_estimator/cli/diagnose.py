@@ -41,7 +41,7 @@ def _parser() -> Parser:
 def run(arguments: argparse.Namespace) -> None:
     check_written(arguments, *arguments.bags, json=arguments.json, apply=arguments.apply)
     effects = effects_of(arguments)
-    structure = load_model(arguments.model)
+    structure = load_model(arguments.model, effects)
     found = diagnose(structure, [read_bag(bag) for bag in arguments.bags], effects)
     if arguments.json:  # files before words: `| head` ends this at a line that nobody reads
         write_json(arguments.json, found.as_json())

@@ -40,10 +40,10 @@ def _parser() -> Parser:
 
 def estimate(arguments: argparse.Namespace) -> None:
     check_written(arguments, arguments.bag, json=arguments.json)
-    structure = load_model(arguments.model)
+    effects = effects_of(arguments)
+    structure = load_model(arguments.model, effects)
     recording = read_crash(arguments.bag)
     settings = parse_settings(arguments.set) | ({"effective_mass": True} if arguments.effective_mass else {})
-    effects = effects_of(arguments)
     estimator = make_estimator(structure, recording.test, arguments.method, effects=effects, **settings)
     estimates = run(estimator, recording.samples())
     description, errors = estimator.description, equation_errors(estimator.description, estimates)

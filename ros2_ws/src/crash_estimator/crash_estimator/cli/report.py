@@ -45,12 +45,13 @@ def report(arguments: argparse.Namespace) -> None:
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"{visible(folder)} is a file: --to takes a folder")
     check_written(arguments, arguments.bag, to=folder / "report.md")
-    structure = load_model(arguments.model)
+    effects = effects_of(arguments)
+    structure = load_model(arguments.model, effects)
     recording = read_crash(arguments.bag)
     smooth, said = smoother(recording, arguments.cfc)
     page, figures = write_report(
         recording, structure, list(dict.fromkeys(arguments.methods)), folder, arguments.end, smooth, said,
-        effects=effects_of(arguments),
+        effects=effects,
     )  # fmt: skip
     say(f"{recording.test.id}: {visible(page)} and {figures} figures")
 

@@ -54,7 +54,8 @@ def _parser() -> Parser:
 
 def simulate(arguments: argparse.Namespace) -> None:
     check_written(arguments, arguments.bag, arguments.source, json=arguments.json)
-    model, effects = load_model(arguments.model), effects_of(arguments)
+    effects = effects_of(arguments)
+    model = load_model(arguments.model, effects)
     settings = parse_settings(arguments.set) | {"effects": effects}
     recording = read_crash(arguments.bag)
     if not arguments.end > 0.0:

@@ -10,10 +10,11 @@ A free body gives one equation, divided by its mass so that measured, predicted 
 the accelerometer's m/s^2; a fixed body with a measured force gives another, in N, the force on it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
+from typing import NoReturn
 
 import numpy as np
 
@@ -28,7 +29,14 @@ TYPICAL_CRUSH, TYPICAL_RATE = 0.1, 5.0
 
 
 class ModelError(Fault):
-    """The model is at fault, or does not fit the test; the message is one readable line."""
+    """The model is at fault, or does not fit the test; the message is one readable line.
+
+    keys: where a model file has what is at fault, such as ("elements", "door_rib", "between").
+    """
+
+    def __init__(self, message: str, keys: tuple[str | int, ...] = ()):
+        super().__init__(message)
+        self.keys = keys
 
 
 @dataclass(frozen=True)
@@ -148,30 +156,37 @@ class Structure:
     actions: tuple[Action, ...] = ()  # of the effects, once they are applied
 
     def __post_init__(self):
+        known = [body.name for body in self.bodies]
         for element in self.elements:
             for end in element.between:
-                self._require(end, [body.name for body in self.bodies], f"element {element.name}: no body")
+                if end not in known:
+                    near = get_close_matches(end, known, n=1)
+                    hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+                    self._at_fault(f"element {element.name}: no body {end!r}; {hint}", "elements", element.name, "between")
         for body in self.bodies:
-            if body.free and not (body.mass and body.mass > 0):
-                raise ModelError(f"model {self.name}: body {body.name} is free and needs a mass > 0 kg")
-            if not body.fixed and not body.acceleration:
-                raise ModelError(f"model {self.name}: body {body.name} names no channel for its motion")
+            self._check_body(body)
         for element in self.elements:
+            place = "elements", element.name
             if element.unloading is not None and element.unloading_slope is not None:
-                raise ModelError(f"model {self.name}: element {element.name} has a known and an estimated unloading")
+                self._at_fault(f"element {element.name} has a known and an estimated unloading", *place, "unloading")
             for term in element.terms:
                 if term.of not in ("crush", "rate") or term.power < 2:
-                    raise ModelError(
-                        f"model {self.name}: element {element.name}: a further power is 2 or more, got {term}"
-                    )
+                    self._at_fault(f"element {element.name}: a further power is 2 or more, got {term}", *place)
         if not self.equations:
-            raise ModelError(f"model {self.name} has no equation to fit: give a free body an acceleration channel")
+            self._at_fault("there is no equation to fit: give a free body an acceleration channel", "bodies")
 
-    def _require(self, name: str, known: Sequence[str], complaint: str) -> None:
-        if name not in known:
-            near = get_close_matches(name, known, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else f"; there are {', '.join(known)}"
-            raise ModelError(f"model {self.name}: {complaint} {name!r}{hint}")
+    def _check_body(self, body: Body) -> None:
+        place = "bodies", body.name
+        if body.free and not (body.mass and body.mass > 0):
+            self._at_fault(f"body {body.name} is free and needs a mass > 0 kg", *place)
+        if not body.fixed and not body.acceleration:
+            self._at_fault(f"body {body.name} names no channel for its motion", *place)
+        if len(set(body.acceleration)) < len(body.acceleration):
+            key = "motion" if body.driven else "acceleration"
+            self._at_fault(f"body {body.name} names a channel twice: {', '.join(body.acceleration)}", *place, key)
+
+    def _at_fault(self, what: str, *keys: str) -> NoReturn:
+        raise ModelError(f"model {self.name}: {what}", keys)
 
     @cached_property
     def body_index(self) -> dict[str, int]:

@@ -3,14 +3,15 @@
 import time
 from collections.abc import Callable
 
+from crash_msgs.msg import Samples
 from crash_msgs.srv import GetSamples
 from rclpy.node import Node
 from rclpy.task import Future
 
 from crash_replay.attending import Attending
+from crash_replay.recording import RecordingError
 
 from ..kept import Rows
-from .samples import rows_of
 
 PATIENCE = 10.0
 """s of wall clock for an answer; then it is asked for again, where the replay is there by its own word."""
@@ -21,9 +22,17 @@ DISCOVERY = 1.0
 
 
 class Asking:
-    def __init__(self, node: Node, service: str, attending: Attending, done: Callable[[Rows | None], None]):
-        """done: called with the samples, or with None where there are none to be had, and `why_not` says why."""
-        self.node, self.attending, self.done = node, attending, done
+    def __init__(
+        self,
+        node: Node,
+        service: str,
+        attending: Attending,
+        done: Callable[[Rows | None], None],
+        fitting: Callable[[Samples], Rows],
+    ):
+        """done: called with the samples, or with None where there are none to be had, and `why_not` says why;
+        fitting: what makes them of an answer, and raises RecordingError where they cannot be of the test."""
+        self.node, self.attending, self.done, self.fitting = node, attending, done, fitting
         self.why_not = ""
         self.client = node.create_client(GetSamples, service)
         self.wanted: GetSamples.Request | None = None
@@ -77,12 +86,23 @@ class Asking:
     def _answered(self, call: Future) -> None:
         if call is not self.call:
             return
+        wanted, response, rows = self.wanted, call.result(), None
         self._forget()
-        response = call.result()
         self.why_not = "" if response.success else response.message or "refused"
+        if not self.why_not:
+            try:
+                rows = self._rows(response.samples, wanted.start)
+            except RecordingError as error:
+                self.why_not = str(error)
         if self.why_not:
             self.node.get_logger().warning(f"{self.client.srv_name}: {self.why_not}")
-        self.done(None if self.why_not else rows_of(response.samples))
+        self.done(rows)
+
+    def _rows(self, samples: Samples, start: int) -> Rows:
+        rows = self.fitting(samples)
+        if not rows.number <= start < rows.end:
+            raise RecordingError(f"sent samples from {rows.number} on where those from {start} on were asked for")
+        return rows
 
     def _look(self) -> None:
         if not self.wanted:

@@ -9,6 +9,7 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from crash_replay.channel_messages import CARRIERS, decode
+from crash_replay.limits import TIME
 from crash_replay.qos import EVERY_SAMPLE
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import CHANNEL_TYPES, stamp_ns, test_from_msg
@@ -19,8 +20,8 @@ from ..kept import Rows
 
 QUIET = 0.5
 """s of wall clock without a message after which the last samples are taken as they are."""
-MOST = 100_000
-"""Messages to keep while the test they belong to is not known."""
+MOST, LONGEST = 100_000, 1000
+"""Messages to keep while the test they belong to is not known, and bytes of one."""
 
 
 class ChannelFeed:
@@ -80,7 +81,7 @@ class ChannelFeed:
 
     def _put(self, name: str, data: bytes) -> None:
         if self.alignment is None:
-            if len(self.early) < MOST:
+            if len(self.early) < MOST and len(data) < LONGEST:
                 self.early.append((name, data))
             return
         if name not in self.channels:
@@ -94,11 +95,14 @@ class ChannelFeed:
             return
         try:
             (stamp,), (value,) = decode(channel, [bytes(data)])
+            time_ns = int(stamp) - self.time_zero
+            if wrong := TIME.wrong(time_ns * 1e-9):
+                raise RecordingError(f"time since the impact {wrong}")
         except RecordingError as error:
             self._complain(name, str(error))
             return
         self.last_put = time.monotonic()
-        self.alignment.put(k, int(stamp) - self.time_zero, float(value))
+        self.alignment.put(k, time_ns, float(value))
 
     def _complain(self, name: str, why: str) -> None:
         if name not in self.complained:

@@ -11,13 +11,15 @@ from functools import partial
 
 from crash_msgs.msg import Samples, TestInfo
 from crash_msgs.srv import AddEffect, RemoveEffect
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.task import Future
 
 from crash_replay.attending import Attending, Progress
 from crash_replay.bag import read_bag
+from crash_replay.complaints import Complaints
 from crash_replay.health import HealthReport
+from crash_replay.limits import most_samples
+from crash_replay.node_parameters import NAME, Allowed, declare_parameters, names_in
 from crash_replay.qos import EVERY_SAMPLE, LATCHED
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import stamp, stamp_ns, test_from_msg
@@ -30,7 +32,7 @@ from ..core.effects.user import load_effects
 from ..core.kinematics import Kinematics
 from ..core.structure import ModelError, Structure
 from ..kept import Kept, Rows
-from ..model_file import load_model, ready_models
+from ..model_file import MODEL, load_model
 from .asking import Asking
 from .catching_up import CatchingUp
 from .channel_feed import ChannelFeed
@@ -38,8 +40,9 @@ from .diagnosis_messages import Moment
 from .diagnosis_telling import Telling
 from .diagnosis_worker import Task, Worker, WorkerError
 from .effect_requests import request_of, with_effect
+from .hearing import hear
 from .node_health import diagnosis_health
-from .samples import rows_of
+from .samples import Received, fitting, received, rows_of, what_is_wrong
 
 LOOK = 0.02
 """s of wall clock between two looks whether an answer has come."""
@@ -48,23 +51,27 @@ TOLERATED = 0.01
 """Share of the samples so far that may be missing: the motion is integrated across small gaps only."""
 
 
+PARAMETERS = {
+    "model": Allowed("", MODEL, needed=f"give {MODEL}"),
+    "with_bags": Allowed([""], "other recordings of the same structure, used with the replayed one"),
+    "effects": Allowed("", "your own effects, a .py file; it is executed"),
+    "every": Allowed(0.002, "s of the crash between two rankings", 1e-5, 1e4),
+    "add_first": Allowed(False, "add the first effect that a final answer names, once"),
+    "estimators": Allowed([""], "names of estimators that it is added to as well", pattern=NAME),
+    "replay": Allowed("replay", "node that samples are asked of which were missed", pattern=NAME),
+}
+
+
 class DiagnosisNode(Node):
     def __init__(self, **options) -> None:
-        """options: of rclpy's Node. Raises ModelError or RecordingError with one line."""
-        super().__init__("diagnosis", **options)
-        model = self._declared("model", "", f"a .yaml file, or one of {', '.join(ready_models())}")
-        bags = self._declared("with_bags", [""], "other recordings of the same structure, used with the replayed one")
-        effects = self._declared("effects", "", "your own effects, a .py file; it is executed")
-        every = self._declared("every", 0.002, "s of the crash between two rankings")
-        self.adds = self._declared("add_first", False, "add the first effect that a final answer names, once")
-        estimators = self._declared("estimators", [""], "names of estimators that it is added to as well")
-        replay = self._declared("replay", "replay", "node that samples are asked of which were missed")
-        if not model:
-            raise ModelError(f"parameter model is not set: give a .yaml file, or one of {', '.join(ready_models())}")
-        self.every_ns = round(every * 1e9)
-        self.structure, self.revision = load_model(model), 0
+        """options: of rclpy's Node. Raises ModelError, RecordingError or ParameterError with one line."""
+        super().__init__("diagnosis", automatically_declare_parameters_from_overrides=True, **options)
+        asked = declare_parameters(self, PARAMETERS)
+        model, effects, replay = asked["model"], asked["effects"], asked["replay"]
+        self.adds, self.every_ns = asked["add_first"], round(asked["every"] * 1e9)
         self.effects = EFFECTS | (load_effects(effects) if effects else {})
-        self.bags = [bag for bag in bags if bag]
+        self.structure, self.revision = load_model(model, self.effects), 0
+        self.bags = names_in(asked["with_bags"])
         for bag in self.bags:
             Kinematics(self.structure, read_bag(bag).test)
         self.kept: Kept | None = None  # None: no test yet, or one that the model does not fit
@@ -78,23 +85,21 @@ class DiagnosisNode(Node):
         self.prepared = False  # its process has compiled its code
         self.rest_of = 0  # the pass that what has not come is asked of
         self.finals: dict[tuple[int, int], LiveAnswer] = {}  # by revision and samples missing
+        self.complaints = Complaints(lambda line: self.get_logger().error(line))
         self.telling = Telling(self, self.structure)
         self.worker = Worker(self.structure, effects, self.bags)
-        self.also_add = {name: self.create_client(AddEffect, f"{name}/add_effect") for name in estimators if name}
+        self.also_add = {name: self.create_client(AddEffect, f"{name}/add_effect") for name in names_in(asked["estimators"])}
         self.create_service(AddEffect, "~/add_effect", self._on_add_effect)
         self.create_service(RemoveEffect, "~/remove_effect", self._on_remove_effect)
         self.attending = Attending(self, "diagnosis", self._progress)
-        self.asking = Asking(self, f"{replay}/get_samples", self.attending, self._on_samples_again)
+        self.asking = Asking(self, f"{replay}/get_samples", self.attending, self._on_samples_again, self._fitting)
         self.catching_up = CatchingUp(self, self.attending, self._place, self._ask_for_rest)
         self.feed = ChannelFeed(self, "samples", self._on_feed_begins, self._on_feed)
         HealthReport(self, "answers", partial(diagnosis_health, self))
-        self.create_subscription(TestInfo, "test", self._on_test, LATCHED)
-        self.create_subscription(Samples, "samples", self._on_samples, EVERY_SAMPLE)
+        hear(self, self.complaints, TestInfo, "test", self._on_test, LATCHED)
+        hear(self, self.complaints, Samples, "samples", self._on_samples, EVERY_SAMPLE, received)
         self.create_timer(LOOK, self._look)
         self.attending.tell()
-
-    def _declared(self, name: str, default, description: str):
-        return self.declare_parameter(name, default, ParameterDescriptor(description=description)).value
 
     def destroy_node(self) -> None:
         self.worker.close()
@@ -114,24 +119,24 @@ class DiagnosisNode(Node):
             self.at_fault = " ".join(str(error).split())
             self.get_logger().error(f"{self.at_fault}; nothing is diagnosed on this test")
             return
-        self.kept = Kept(test, message.samples)
+        self.kept = Kept(test)
         self.time_zero = stamp_ns(message.time_zero)
         name = self.telling.name(self.structure)
         self.get_logger().info(f"test {test.id}: model {name}, with {len(self.bags)} other recordings")
         self.feed.set_test(message)
 
-    def _on_samples(self, message: Samples) -> None:
-        if self.kept is None or not message.time_ns:
+    def _on_samples(self, message: Received) -> None:
+        if self.kept is None:
             return
         self.catching_up.came()
-        try:
-            rows = rows_of(message)
-            self.kept.put_rows(rows)
-        except ValueError as error:
-            self.get_logger().error(
-                f"samples from number {message.number}: {error}: left out; is there a second replay, of another test?"
+        if wrong := what_is_wrong(message, self.kept, self.total):
+            self.complaints.complain(
+                "misfit",
+                f"samples from number {message.number}: {wrong}: left out; is there a second replay, of another test?",
             )
             return
+        rows = rows_of(message)
+        self.kept.put_rows(rows)
         if message.run != self.run or message.number == 0:
             self._begin_anew()
             self.run, self.end = message.run, rows.end
@@ -141,14 +146,17 @@ class DiagnosisNode(Node):
         if self.kept is None:
             return
         if renumbered:
-            self.kept = Kept(self.kept.test, self.total)
+            self.kept = Kept(self.kept.test)
         self._begin_anew()
         self.run, self.end = self.run + 1, 0
 
     def _on_feed(self, rows: Rows) -> None:
-        if self.kept is not None:
+        if self.kept is not None and rows.end <= most_samples(rows.values.shape[1]):
             self.kept.put_rows(rows)
             self.end = max(self.end, rows.end)
+
+    def _fitting(self, samples: Samples) -> Rows:
+        return fitting(samples, self.kept, self.total)
 
     def _place(self) -> tuple[int, int] | None:
         """What has come of the test, where more may be asked for."""

@@ -10,22 +10,20 @@ from ..cli.common import parse_settings
 from ..core.effects import EFFECTS
 from ..core.effects.user import load_effects
 from ..core.methods import AnyEstimator, make_estimator
-from ..core.structure import ModelError, Structure
+from ..core.structure import Structure
 from ..following.follower import Follower
 from ..kept import Kept, Rows
-from ..model_file import load_model, ready_models
+from ..model_file import load_model
 
 
 class EstimatorModel:
     def __init__(self, model: str, method: str, settings: Sequence[str], effects: str, effective_mass: bool):
         """The node's parameters. Raises ModelError with one line."""
-        if not model:
-            raise ModelError(f"parameter model is not set: give a .yaml file, or one of {', '.join(ready_models())}")
         self.method, self.settings = method, parse_settings([pair for pair in settings if pair])
         if effective_mass:
             self.settings["effective_mass"] = True
         self.known_effects = EFFECTS | (load_effects(effects) if effects else {})
-        self.structure, self.revision = load_model(model), 0
+        self.structure, self.revision = load_model(model, self.known_effects), 0
         self.try_out(self.structure)
 
     def estimator(self, structure: Structure, test: Test) -> AnyEstimator:

@@ -11,12 +11,14 @@ from functools import partial
 
 from crash_msgs.msg import Samples, TestInfo
 from crash_msgs.srv import AddEffect, RemoveEffect
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from crash_replay.attending import Attending, Progress
+from crash_replay.complaints import Complaints
 from crash_replay.health import HealthReport
+from crash_replay.limits import most_samples
+from crash_replay.node_parameters import NAME, Allowed, declare_parameters
 from crash_replay.qos import EVERY_SAMPLE, LATCHED, UNLATCHED
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import stamp_ns, test_from_msg
@@ -31,39 +33,43 @@ from ..following.arrivals import Waiting, missing_text
 from ..following.columns import Columns, FilterFailure
 from ..following.follower import Follower
 from ..kept import Kept, Rows
-from ..model_file import ready_models
+from ..model_file import MODEL
 from .channel_feed import ChannelFeed
 from .effect_requests import with_effect
 from .estimates_again import EstimatesAgain
 from .estimator_model import EstimatorModel
 from .estimator_topics import EstimatorTopics
+from .hearing import hear
 from .intake import Intake
 from .node_health import estimator_health
-from .samples import MOST, Received, received, rows_of, what_is_wrong
+from .samples import Received, fitting, received, rows_of, what_is_wrong
+
+PARAMETERS = {
+    "model": Allowed("", MODEL, needed=f"give {MODEL}"),
+    "method": Allowed("constrained_kalman", f"one of {', '.join(METHODS)}"),
+    "settings": Allowed([""], "settings of the method, such as forgetting=0.98"),
+    "effects": Allowed("", "your own effects, a .py file; it is executed"),
+    "effective_mass": Allowed(False, "find the masses that go with the accelerometers first"),
+    "replay": Allowed("replay", "node that samples are asked of which were missed", pattern=NAME),
+}
 
 
 class EstimatorNode(Node):
     def __init__(self, **options) -> None:
-        """options: of rclpy's Node, such as parameter_overrides. Raises ModelError with one line."""
-        super().__init__("estimator", **options)
-        asked = {
-            "method": self._declared("method", "constrained_kalman", f"one of {', '.join(METHODS)}"),
-            "model": self._declared("model", "", f"a .yaml file, or one of {', '.join(ready_models())}"),
-            "settings": self._declared("settings", [""], "settings of the method, such as forgetting=0.98"),
-            "effects": self._declared("effects", "", "your own effects, a .py file; it is executed"),
-            "effective_mass": self._declared(
-                "effective_mass", False, "find the masses that go with the accelerometers first"
-            ),
-        }
+        """options: of rclpy's Node, such as parameter_overrides. Raises ModelError or ParameterError with one line."""
+        super().__init__("estimator", automatically_declare_parameters_from_overrides=True, **options)
+        asked = declare_parameters(self, PARAMETERS)
+        replay = asked.pop("replay")
         with compiling_said(self.get_logger().info):
             self.model = EstimatorModel(**asked)
-        replay = self._declared("replay", "replay", "node that samples are asked of which were missed")
         self.test_message: TestInfo | None = None
         self.unlatched: TestInfo | None = None  # come by itself, and to come once more if its publisher latches
         self.follower: Follower | None = None  # None: no test yet, or one that the model does not fit
         self.latest: Columns | None = None  # estimates of this test
         self.stopped = ""  # why no filter can go on with these numbers, until the next pass
         self.at_fault = ""  # why nothing is estimated on this test
+        self.complaints = Complaints(lambda line: self.get_logger().error(line))
+        self.warnings = Complaints(lambda line: self.get_logger().warning(line))
         self.topics = EstimatorTopics(self)
         self.again = EstimatesAgain(self)
         self.attending = Attending(self, "estimator", self._progress)
@@ -73,13 +79,10 @@ class EstimatorNode(Node):
         self.create_service(AddEffect, "~/add_effect", self._on_add_effect)
         self.create_service(RemoveEffect, "~/remove_effect", self._on_remove_effect)
         self.feed, self.feed_run = ChannelFeed(self, "samples", self._on_feed_begins, self._on_feed), -1
-        self.create_subscription(TestInfo, "test", self._on_test, LATCHED)
-        self.create_subscription(TestInfo, "test", self._on_unlatched_test, UNLATCHED)
-        self.create_subscription(Samples, "samples", self._on_samples, EVERY_SAMPLE, raw=True)
+        hear(self, self.complaints, TestInfo, "test", self._on_test, LATCHED)
+        hear(self, self.complaints, TestInfo, "test", self._on_unlatched_test, UNLATCHED)
+        hear(self, self.complaints, Samples, "samples", self._on_samples, EVERY_SAMPLE, received)
         self.attending.tell()
-
-    def _declared(self, name: str, default, description: str):
-        return self.declare_parameter(name, default, ParameterDescriptor(description=description)).value
 
     def _on_unlatched_test(self, message: TestInfo) -> None:
         """From a publisher that latches nothing: rosbag2's, of a bag without quality of service."""
@@ -104,35 +107,38 @@ class EstimatorNode(Node):
             self.at_fault = " ".join(str(error).split())
             self.get_logger().error(f"{self.at_fault}; nothing is estimated on this test")
             return
-        self.follower = Follower(estimator, Kept(test, message.samples))
+        self.follower = Follower(estimator, Kept(test))
         self.intake.begin_test(listening=True)
         self.again.begin_test(stamp_ns(message.time_zero))
         self._say_from_now_on(message)
         self.get_logger().info(f"test {test.id}: model {self.model.structure.name}, method {self.model.method}")
         self.feed.set_test(message)
 
-    def _on_samples(self, raw: bytes) -> None:
-        message = received(raw)
+    def _on_samples(self, message: Received) -> None:
         if self.follower is None or not self._fits(message):
             return self.leave_out(message.run, message.number + max(0, len(message.time_ns) - 1))
         self.intake.receive(message.run, rows_of(message), message.stamp_ns)
 
     def _fits(self, message: Received) -> bool:
-        wrong = what_is_wrong(message, len(self.follower.kept.test.channels), self.test_message.samples)
+        wrong = what_is_wrong(message, self.follower.kept, self.test_message.samples)
         if wrong:
-            self.get_logger().error(
-                f"samples from number {message.number}: {wrong}: left out; is there a second replay, of another test?"
+            self.complaints.complain(
+                "misfit",
+                f"samples from number {message.number}: {wrong}: left out; is there a second replay, of another test?",
             )
         return not wrong
+
+    def fitting(self, samples: Samples) -> Rows:
+        return fitting(samples, self.follower.kept, self.test_message.samples)
 
     def _on_feed_begins(self, renumbered: bool) -> None:
         self.feed_run += 1
         if renumbered and self.follower:
             kept = self.follower.kept
-            self.follower = Follower(self.follower.estimator, Kept(kept.test, len(kept.seen)))
+            self.follower = Follower(self.follower.estimator, Kept(kept.test))
 
     def _on_feed(self, rows: Rows) -> None:
-        if self.follower and rows.end <= MOST:
+        if self.follower and rows.end <= most_samples(rows.values.shape[1]):
             self.intake.receive(self.feed_run, rows, self.stamp_of(rows))
 
     # what is done with the samples, in their order: the intake's consumer
@@ -198,7 +204,7 @@ class EstimatorNode(Node):
         missing = arrival.lost or samples.sent_again + self.follower.kept.missing(number)
         if missing:
             text = missing_text(number, missing, samples.sent_again, holds_from, arrival.begins)
-            self.get_logger().warning(text)
+            self.warnings.complain("lost", text)
             self.topics.event("lost", "samples", float(missing), text, samples.run, number, samples.stamp_ns)
         self._publish_state(samples.run, number, samples.stamp_ns)
 
@@ -264,7 +270,7 @@ class EstimatorNode(Node):
 
 
 def main() -> int:
-    return run(EstimatorNode, (ModelError, RecordingError), close=lambda node: node.attending.leave())
+    return run(EstimatorNode, (ModelError, RecordingError, ParameterError), close=lambda node: node.attending.leave())
 
 
 if __name__ == "__main__":

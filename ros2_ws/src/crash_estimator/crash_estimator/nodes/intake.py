@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
+from crash_msgs.msg import Samples
 from rclpy.node import Node
 
 from crash_replay.attending import Attending
@@ -24,6 +25,7 @@ class Consumer(Protocol):
     def take(self, samples: Waiting) -> None: ...  # the next ones
     def leave_out(self, run: int, number: int) -> None: ...  # samples up to this one have come already
     def stamp_of(self, rows: Rows) -> int: ...  # ns, of the first
+    def fitting(self, samples: Samples) -> Rows: ...  # those of an answer; raises RecordingError
 
 
 class Intake:
@@ -35,7 +37,7 @@ class Intake:
         self.listening = False  # to a test
         self.rest_of = 0  # the pass that more is asked of while nothing waits
         self.refused: Place | None = None  # nothing more can be had from here on
-        self.asking = Asking(node, service, attending, self._on_asked)
+        self.asking = Asking(node, service, attending, self._on_asked, consumer.fitting)
         self.catching_up = CatchingUp(node, attending, self._place, self._ask_for_rest)
 
     def begin_test(self, listening: bool) -> None:

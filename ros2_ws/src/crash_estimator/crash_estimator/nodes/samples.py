@@ -1,19 +1,17 @@
-"""crash_msgs/Samples -> arrays."""
+"""crash_msgs/Samples -> arrays, and whether they can be what they say."""
 
 import struct
 from typing import NamedTuple
 
 import numpy as np
 from crash_msgs.msg import Samples
-from rclpy.serialization import deserialize_message
 
 from crash_replay.cdr import PLAIN, aligned
-from crash_replay.ros_messages import stamp_ns
+from crash_replay.limits import MESSAGE, SAMPLES, TIME, VALUE, count_wrong, most_samples
+from crash_replay.recording import RecordingError
+from crash_replay.ros_messages import decoded, stamp_ns
 
-from ..kept import Rows
-
-MOST = 10_000_000
-"""Samples in a test that does not say how many it has: to keep more would take all memory."""
+from ..kept import Kept, Rows
 
 
 class Received(NamedTuple):
@@ -30,10 +28,22 @@ HEADER, RUN, NUMBER, LENGTH = struct.Struct("<iII"), struct.Struct("<I"), struct
 
 
 def received(raw: bytes) -> Received:
-    """A message as the middleware has it: to have rclpy make an object of it would take longer than to estimate."""
-    if raw[: len(PLAIN)] != PLAIN:  # from a machine of the other byte order
-        message = deserialize_message(raw, Samples)
-        return Received(message.run, message.number, stamp_ns(message.header.stamp), *_arrays_of(message))
+    """A message as the middleware has it: to have rclpy make an object of it would take longer than to estimate.
+
+    Raises RecordingError where the bytes are no such message.
+    """
+    if wrong := count_wrong("has", len(raw), MESSAGE):
+        raise RecordingError(f"does not decode as Samples: {wrong}")
+    try:
+        message = _received(raw) if raw[: len(PLAIN)] == PLAIN else _of_the_other_byte_order(raw)
+    except (struct.error, ValueError) as error:  # lengths beyond the end
+        raise RecordingError(f"does not decode as Samples: {len(raw)} bytes, {error}") from None
+    if wrong := SAMPLES.wrong(message.number):  # not even an answer could be sent to that
+        raise RecordingError(f"the number of the first sample {wrong}")
+    return message
+
+
+def _received(raw: bytes) -> Received:
     at = len(PLAIN)
     sec, nanosec, text = HEADER.unpack_from(raw, at)
     at = aligned(at + HEADER.size + text, 4)
@@ -56,8 +66,10 @@ def _sequence(raw: bytes, at: int, kind: type) -> tuple[np.ndarray, int]:
     return np.frombuffer(raw, kind, length, at).copy(), at + 8 * length
 
 
-def _arrays_of(message: Samples) -> tuple[np.ndarray, np.ndarray]:
-    return np.array(message.time_ns, dtype=np.int64), np.array(message.values, dtype=np.float64)
+def _of_the_other_byte_order(raw: bytes) -> Received:
+    message = decoded(raw, Samples)
+    time_ns, values = np.array(message.time_ns, dtype=np.int64), np.array(message.values, dtype=np.float64)
+    return Received(message.run, message.number, stamp_ns(message.header.stamp), time_ns, values)
 
 
 def rows_of(message: Samples | Received) -> Rows:
@@ -66,9 +78,32 @@ def rows_of(message: Samples | Received) -> Rows:
     return Rows(message.number, time_ns, np.frombuffer(message.values).reshape(len(time_ns), -1))
 
 
-def what_is_wrong(message: Samples | Received, channels: int, total: int) -> str:
-    """With a message on a test of so many channels and samples (0: not stated); "" for nothing."""
-    count, found = len(message.time_ns), len(message.values)
+TIME_NS = int(TIME.highest * 1e9)
+
+
+def what_is_wrong(message: Samples | Received, kept: Kept, total: int) -> str:
+    """With a message on a test of which these samples are kept, and which has so many (0: not stated); "": nothing."""
+    count, found, channels = len(message.time_ns), len(message.values), len(kept.test.channels)
     if not found or found != count * channels:
         return f"expected {count * channels} values ({channels} channels), found {found}"
-    return f"the test has {total or MOST} samples" if message.number + count > (total or MOST) else ""
+    total = total or most_samples(channels)
+    if message.number + count > total:
+        return f"the test has {total} samples"
+    time_ns = np.asarray(message.time_ns)
+    if count > 1 and not (time_ns[1:] > time_ns[:-1]).all():
+        return "their times do not increase"
+    first, last = time_ns.item(0), time_ns.item(-1)
+    if not -TIME_NS <= first <= last <= TIME_NS:
+        return f"their times go from {first * 1e-9:g} to {last * 1e-9:g} s, to be within {TIME.highest:g} s of the impact"
+    if not np.fmax.reduce(np.abs(message.values), initial=0.0) <= VALUE.highest:
+        return f"a value is beyond {VALUE.highest:g}"
+    if not kept.agrees(message.number, time_ns):
+        return "their times are not those of the samples before, beside or after them"
+    return ""
+
+
+def fitting(samples: Samples, kept: Kept, total: int) -> Rows:
+    """The samples of a message that was asked for; raises RecordingError where they cannot be of the test."""
+    if wrong := what_is_wrong(samples, kept, total):
+        raise RecordingError(f"samples from number {samples.number}: {wrong}")
+    return rows_of(samples)

@@ -4,6 +4,7 @@ import numpy as np
 from crash_msgs.msg import Event, Forces, Misfit, Parameters, RankedEffect, Ranking, Residuals, TestInfo
 
 from crash_replay.foreign_text import visible
+from crash_replay.recording import RecordingError
 
 from ..viewer.blocks import EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock
 from ..viewer.findings import Candidate, MisfitBlock, RankingBlock, RevisionBlock, Window
@@ -119,6 +120,10 @@ def _head(estimator: str, message: Parameters | Residuals | Forces) -> tuple:
 
 
 def _tables(message: Parameters | Residuals | Forces, width: int, fields: tuple[str, ...]) -> dict[str, np.ndarray]:
-    """Fields of n x width values, sent row by row. Raises ValueError where a length does not fit."""
+    """Fields of n x width values, sent row by row. Raises RecordingError where a length does not fit."""
     n = len(message.time_ns)
+    for name in fields:
+        if len(getattr(message, name)) != n * width:
+            found = len(getattr(message, name))
+            raise RecordingError(f"{name}: expected {n * width} values ({n} samples of {width}), found {found}")
     return {name: np.asarray(getattr(message, name)).reshape(n, width) for name in fields}

@@ -13,24 +13,27 @@ from collections.abc import Callable, Hashable, Sequence
 from functools import cache, partial
 
 from crash_msgs.msg import ReplayState, Samples, TestInfo
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
+from crash_replay.complaints import Complaints
 from crash_replay.foreign_text import visible
 from crash_replay.health import HealthReport
+from crash_replay.node_parameters import NAME, Allowed, declare_parameters, names_in
 from crash_replay.output import check_outputs
 from crash_replay.qos import LATCHED, SAID, STREAM, UNACKNOWLEDGED
+from crash_replay.recording import RecordingError
+from crash_replay.ros_messages import decoded, test_from_msg
 from crash_replay.ros_runtime import run
 from crash_replay.said import say
 
-from ..core.structure import Structure
+from ..core.structure import ModelError, Structure
 from ..model_file import load_model, ready_models
 from ..viewer.native import has_display, open_viewer
 from ..viewer.recorder import Recorder
 from ..viewer.sinks import Sinks
+from .hearing import hear
 from .node_health import viewer_health
 from .viewer_messages import BLOCK_OF, FINDING_OF, test_block
 
@@ -41,24 +44,32 @@ SETTLED = 0.3
 """s for which all publishers must have been there: they hear of their subscriber a little later than it of them."""
 
 
+PARAMETERS = {
+    "estimators": Allowed([""], "names of estimators; empty: all there are", pattern=NAME),
+    "models": Allowed([""], "files of models other than the ready ones, for the validation"),
+    "port": Allowed(9876, "of the gRPC server on 127.0.0.1 that viewers connect to; 0: a free one", 0, 65_535),
+    "rrd": Allowed("crash.rrd", "file that the recording is written to; empty: none"),
+    "memory_limit": Allowed(
+        "1GiB", "what the server keeps for viewers that come late, such as 500MB or 10%", pattern=r"\d{1,6}(%|[kMGT]i?B|B)"
+    ),
+    "open": Allowed(True, "open the native viewer where there is a display"),
+    "exit_when_finished": Allowed(False, "end with the replay"),
+}
+
+
 class ViewerNode(Node):
     def __init__(self) -> None:
-        super().__init__("viewer")
+        super().__init__("viewer", automatically_declare_parameters_from_overrides=True)
+        asked = declare_parameters(self, PARAMETERS)
         # On a busy machine the estimators go first, the picture comes later: this holds for all threads made from here
         # on, Rerun's too, but not for the middleware's, whose acknowledgements the estimators may wait for.
         os.nice(10)
         log = self.get_logger().info
-        names = self._declared("estimators", [""], "names of estimators; empty: all there are")
-        self.estimators = [name for name in names if name]
-        models = self._declared("models", [""], "files of models other than the ready ones, for the validation")
-        port = self._declared("port", 9876, "of the gRPC server on 127.0.0.1 that viewers connect to")
-        rrd = self._declared("rrd", "crash.rrd", "file that the recording is written to; empty: none")
-        check_outputs({"parameter rrd:": rrd or None}, [path for path in models if path])
-        memory = self._declared("memory_limit", "1GiB", "what the server keeps for viewers that come late")
-        wants_window = self._declared("open", True, "open the native viewer where there is a display")
-        self.exits = self._declared("exit_when_finished", False, "end with the replay")
-        sinks = Sinks(port, rrd, memory)
-        known = cache(partial(structure_named, [path for path in models if path]))
+        self.estimators, self.exits = names_in(asked["estimators"]), asked["exit_when_finished"]
+        port, wants_window, models = asked["port"], asked["open"], names_in(asked["models"])
+        check_outputs({"parameter rrd:": asked["rrd"] or None}, models)
+        sinks = Sinks(port, asked["rrd"], asked["memory_limit"])
+        known = cache(partial(structure_named, models))
         warn = self.get_logger().warning
         self.recorder = Recorder(sinks, tuple(self.estimators), say=warn, structure_of=known)
         if sinks.port != port:
@@ -79,8 +90,9 @@ class ViewerNode(Node):
         self.followed: set[str] = set()
         self.inputs: list[Subscription] = []
         self.heard_since = time.monotonic()
-        self.create_subscription(TestInfo, "test", self._on_test, LATCHED)
-        self.create_subscription(ReplayState, "replay_state", self._on_state, LATCHED)
+        complaints = Complaints(lambda line: self.get_logger().warning(line))
+        hear(self, complaints, TestInfo, "test", self._on_test, LATCHED)
+        hear(self, complaints, ReplayState, "replay_state", self._on_state, LATCHED)
         for topic, (kind, make) in FINDING_OF.items():
             queue = partial(self._queue, kind, make, None)
             self.create_subscription(kind, topic, queue, SAID, raw=True)
@@ -89,9 +101,6 @@ class ViewerNode(Node):
         HealthReport(self, "queue", partial(viewer_health, self.recorder))
         self.create_timer(0.1, self._look_around)
 
-    def _declared(self, name: str, default, description: str):
-        return self.declare_parameter(name, default, ParameterDescriptor(description=description)).value
-
     def _follow(self, name: str) -> None:
         self.followed.add(name)
         for topic, (kind, make) in BLOCK_OF.items():
@@ -99,9 +108,10 @@ class ViewerNode(Node):
             self.inputs.append(self.create_subscription(kind, f"{name}/{topic}", queue, STREAM, raw=True))
 
     def _queue(self, kind: type, make: Callable, stream: Hashable, raw: bytes) -> None:
-        self.recorder.put(lambda: make(deserialize_message(raw, kind)), stream, len(raw))
+        self.recorder.put(lambda: make(decoded(raw, kind)), stream, len(raw))
 
     def _on_test(self, message: TestInfo) -> None:
+        test_from_msg(message)  # raises where it cannot be a test
         self.recorder.put(partial(test_block, message))
 
     def _on_state(self, message: ReplayState) -> None:
@@ -156,7 +166,7 @@ def structure_named(paths: Sequence[str], name: str) -> Structure | None:
 
 
 def main() -> int:
-    return run(ViewerNode, (OSError,), until=lambda node: node.done, close=close)
+    return run(ViewerNode, (OSError, ParameterError, ModelError, RecordingError), until=lambda node: node.done, close=close)
 
 
 def close(node: ViewerNode) -> None:

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 from crash_replay.scheduling import step_back
 
+from crash_replay.complaints import Complaints
+
 from ..core.structure import Structure
 from ..rush import Rush
 from .blocks import Block, EventBlock, TestBlock
@@ -84,7 +86,7 @@ class Recorder:
         self._replay = 0  # a replay that is started again counts its runs from 0 again
         self._passes: dict[tuple[int, int], Pass] = {}  # by (replay, run), the newest last
         self._spare: Pass | None = self._open()  # its server is up before the first sample
-        self._troubles: set[str] = set()
+        self._troubles = Complaints(say)
         self._thread = threading.Thread(target=self._work, name="rerun", daemon=True)
         self._thread.start()
 
@@ -219,12 +221,10 @@ class Recorder:
         return Pass(live, file, self.expected, not self._passes, self._guarded, jury)
 
     def _guarded(self, action: Callable):
-        """A block that cannot be drawn is said once and left out; the rest goes on."""
+        """A block that cannot be drawn is said and left out; the rest goes on."""
         try:
             return action()
         except Exception as error:  # whatever it is, the thread must live
-            trouble = f"{type(error).__name__}: {error}"
-            if trouble not in self._troubles:
-                self._troubles.add(trouble)
-                self.say(f"the viewer leaves something out: {trouble}")
+            what = type(error).__name__
+            self._troubles.complain(what, f"the viewer leaves something out: {what}: {' '.join(str(error).split())}")
             return None

@@ -44,6 +44,8 @@ def read_source(path: str | Path, names: str | Path | None = None, **options: An
         if option not in reader.options:
             raise RecordingError(f"{path}: {reader.expects} takes no option {option!r}; leave it out")
     recording = reader.read(path, **given)
+    if not recording.has_values:
+        raise RecordingError(f"{path}: no channel has a valid value at any sample: there is nothing in it to use")
     beside = path / "import.yaml"
     if names is None and path.is_dir() and beside.is_file():
         names = beside

@@ -10,16 +10,19 @@ A channel's `name` replaces the column's, where that does not fit (letters, digi
 """
 
 import csv
+from array import array
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from pydantic import Field, FiniteFloat
+from pydantic import Field
 
+from .. import limits
 from ..recording import SI_UNIT, Channel, Recording, RecordingError, Test
 from ..yaml_schema import load_yaml, suggestion
-from .description import ChannelNames, Part, TestPart, unknown_bodies
+from .description import ChannelNames, Displacements, Part, TestPart, Velocities, unknown_bodies
 from .units import si_factor
 
 LONG, SPARSE = 10.0, 0.01
@@ -35,8 +38,8 @@ class CsvChannel(ChannelNames):
 class CsvDescription(Part):
     test: TestPart = TestPart()
     channels: dict[str, CsvChannel] = Field(min_length=1)
-    initial_velocity: dict[str, FiniteFloat] = {}
-    initial_displacement: dict[str, FiniteFloat] = {}
+    initial_velocity: Velocities = {}
+    initial_displacement: Displacements = {}
 
 
 def found(path: Path) -> bool:
@@ -64,36 +67,44 @@ def read(path: Path) -> Recording:
             raise RecordingError(f"{beside}: channels.{column}: {error}") from None
         source = f"{path.name}: {column} in {given.unit}" + (", sign turned" if given.sign < 0 else "")
         channels.append(Channel(given.name or column, given.quantity, given.body or "", given.axis or "", source))
-        values.append(factor * table[:, columns.index(column)])
+        values.append(limits.valid_values(table[:, columns.index(column)], factor))
     left_out = [column for column in columns[1:] if column not in description.channels]
     if left_out:
         notes.append(f"left out, not described in {beside.name}: {', '.join(left_out)}")
     notes += unknown_bodies(channels, description.initial_velocity)
-    test = Test(
-        id=description.test.id or path.stem,
-        channels=tuple(channels),
-        title=description.test.title,
-        source=description.test.source,
-        initial_velocity=description.initial_velocity,
-        initial_displacement=description.initial_displacement,
-        notes=tuple(notes),
-    )
-    return Recording(test, np.rint(table[:, 0] * 1e9).astype(np.int64), np.stack(values, axis=1))
+    try:
+        test = Test(
+            id=description.test.id or path.stem,
+            channels=tuple(channels),
+            title=description.test.title,
+            source=description.test.source,
+            initial_velocity=description.initial_velocity,
+            initial_displacement=description.initial_displacement,
+            notes=tuple(notes),
+        )
+        return Recording(test, np.rint(table[:, 0] * 1e9).astype(np.int64), np.stack(values, axis=1))
+    except RecordingError as error:  # two channels of one name, for instance
+        raise RecordingError(f"{beside}: {error}") from None
 
 
 def _read_table(path: Path) -> tuple[list[str], np.ndarray]:
     """The header's names, and the numbers (rows, columns); NaN for an empty cell and for what is not finite."""
+    cells = array("d")  # a list of lists of Python's numbers takes five times as much
     try:
+        if wrong := limits.file_wrong(path, limits.TABLE_FILE):
+            raise RecordingError(f"{path}: {wrong}")
         with path.open(newline="", encoding="utf-8-sig") as file:
             lines = csv.reader(file)
             columns = [name.strip() for name in next(lines, [])]
             _check_header(path, columns)
-            rows = [_numbers(path, lines.line_num, columns, cells) for cells in lines if cells]
+            for row in lines:
+                if row:
+                    cells.extend(_numbers(path, lines.line_num, columns, row))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise RecordingError(f"{path}: cannot be read as a CSV text file ({error})") from None
-    if not rows:
+    if not cells:
         raise RecordingError(f"{path}: has no samples, only a header")
-    table = np.array(rows)
+    table = np.array(cells).reshape(-1, len(columns))
     table[~np.isfinite(table)] = np.nan
     _check_time(path, table[:, 0])
     return columns, table
@@ -101,13 +112,15 @@ def _read_table(path: Path) -> tuple[list[str], np.ndarray]:
 
 def _check_header(path: Path, columns: Sequence[str]) -> None:
     if len(columns) < 2 or columns[0] != "time":
-        shown = ",".join(columns)[:60]
+        shown = limits.shown(",".join(columns))
         raise RecordingError(
-            f"{path}:1: expected a header of comma-separated names, the first `time` (in s), found {shown!r}"
+            f"{path}:1: expected a header of comma-separated names, the first `time` (in s), found {shown}"
         )
-    doubled = [name for name in columns if columns.count(name) > 1]
+    if wrong := limits.count_wrong("has", len(columns) - 1, limits.CHANNELS):
+        raise RecordingError(f"{path}:1: {wrong}")
+    doubled = [name for name, count in Counter(columns).items() if count > 1]
     if doubled:
-        raise RecordingError(f"{path}:1: column {doubled[0]!r} appears more than once: rename or remove one")
+        raise RecordingError(f"{path}:1: column {limits.shown(doubled[0])} appears more than once: rename or remove one")
 
 
 def _numbers(path: Path, line: int, columns: Sequence[str], cells: Sequence[str]) -> list[float]:
@@ -118,7 +131,7 @@ def _numbers(path: Path, line: int, columns: Sequence[str], cells: Sequence[str]
     except ValueError:
         name, cell = next((n, c) for n, c in zip(columns, cells) if c.strip() and not _is_number(c))
         raise RecordingError(
-            f"{path}:{line}: column {name!r}: expected a number or an empty cell, found {cell!r}"
+            f"{path}:{line}: column {limits.shown(name)}: expected a number or an empty cell, found {limits.shown(cell)}"
         ) from None
 
 
@@ -135,6 +148,8 @@ def _check_time(path: Path, time: np.ndarray) -> None:
     row = np.flatnonzero(np.isnan(time))
     if len(row):
         raise RecordingError(f"{path}: sample {row[0]}: time is missing")
+    if wrong := limits.times_wrong(time):
+        raise RecordingError(f"{path}: {wrong}: it must be in s since the impact; is it in ms, or a date?")
     backwards = np.flatnonzero(np.diff(np.rint(time * 1e9)) <= 0)
     if len(backwards):
         k = int(backwards[0]) + 1

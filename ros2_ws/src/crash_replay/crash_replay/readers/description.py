@@ -5,12 +5,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field
 
 from ..recording import Channel, Recording, RecordingError
-from ..yaml_schema import load_yaml, suggestion
+from ..limits import DISPLACEMENT, VELOCITY
+from ..yaml_schema import Text, load_yaml, number, suggestion
 
 Axis = Literal["x", "y", "z", ""]
+Velocities = dict[Text, number(VELOCITY)]
+"""Body -> m/s."""
+Displacements = dict[Text, number(DISPLACEMENT)]
+"""Body -> m."""
 
 
 class Part(BaseModel):
@@ -28,8 +33,8 @@ class TestPart(Part):
 class ChannelNames(Part):
     """What is given replaces what the format says of a channel."""
 
-    name: str | None = None
-    body: str | None = None
+    name: Text | None = None
+    body: Text | None = None
     axis: Axis | None = None
 
 
@@ -38,8 +43,8 @@ class Names(Part):
 
     test: TestPart = TestPart()
     channels: dict[str, ChannelNames] = {}
-    initial_velocity: dict[str, FiniteFloat] = {}  # body -> m/s
-    initial_displacement: dict[str, FiniteFloat] = {}  # body -> m
+    initial_velocity: Velocities = {}
+    initial_displacement: Displacements = {}
 
 
 def apply_names(recording: Recording, path: Path) -> Recording:
@@ -57,8 +62,7 @@ def apply_names(recording: Recording, path: Path) -> Recording:
     channels = tuple(_renamed(channel, names.channels.get(channel.name, ChannelNames())) for channel in test.channels)
     stated = test.initial_velocity
     inherited = {new.body: stated[old.body] for old, new in zip(test.channels, channels) if old.body in stated}
-    renamed = replace(
-        test,
+    changed = dict(
         id=names.test.id or test.id,
         title=names.test.title or test.title,
         source=names.test.source or test.source,
@@ -67,7 +71,10 @@ def apply_names(recording: Recording, path: Path) -> Recording:
         initial_displacement=dict(test.initial_displacement) | names.initial_displacement,
         notes=(*test.notes, f"names taken from {path.name}", *unknown_bodies(channels, names.initial_velocity)),
     )
-    return Recording(renamed, recording.time_ns, recording.values)
+    try:
+        return Recording(replace(test, **changed), recording.time_ns, recording.values)
+    except RecordingError as error:  # two channels of one name, for instance
+        raise RecordingError(f"{path}: {error}") from None
 
 
 def _renamed(channel: Channel, names: ChannelNames) -> Channel:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from ..limits import HEADER_FILE, Range, file_wrong, shown
 from ..recording import RecordingError
 
 
@@ -46,15 +47,26 @@ class Header(NamedTuple):
     curves: tuple[Curve, ...]
 
 
+INDEX = Range(-1e8, 1e8, "", "of a sample: ten seconds at 10 MHz")
+SPEED = Range(-1e4, 1e4, "km/h", "ten times that of sound")
 NUMERIC = {
-    field: Curve.__annotations__[field] for field in ("vehicle", "number", "initial_velocity", "first", "last", "step")
+    "vehicle": (int, Range(0, 99, "", "two digits")),
+    "number": (int, Range(0, 99_999, "", "of a file's suffix")),
+    "initial_velocity": (float, SPEED),
+    "first": (int, INDEX),
+    "last": (int, INDEX),
+    "step": (float, Range(0, 1e7, "us", "0 of a sensor that is not fitted")),
 }
+"""A curve's fields that are numbers, of what kind, and what they may be."""
 TEST_FIELDS = 20
+TEST_MASS = Range(0, 1e6, "kg", "0 where it is not stated")
 
 
 def read_header(path: Path) -> Header:
     """The header. Raises RecordingError with file, line and what was expected."""
     try:
+        if wrong := file_wrong(path, HEADER_FILE):
+            raise RecordingError(f"{path}: {wrong}")
         lines = path.read_text(encoding="latin-1").splitlines()
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
@@ -79,9 +91,9 @@ def read_header(path: Path) -> Header:
         date=test[3],
         laboratory=test[4],
         configuration=test[8],
-        closing_speed=_number(path, line, "closing speed", test[14]),
+        closing_speed=_number(path, line, "closing speed", test[14], SPEED),
         masses={
-            int(_number(path, n, "vehicle", f[0])): _number(path, n, "test mass", f[10])
+            int(_number(path, n, "vehicle", f[0], NUMERIC["vehicle"][1])): _number(path, n, "test mass", f[10], TEST_MASS)
             for n, f in sections.get("VEHICLE", [])
             if len(f) > 10
         },
@@ -102,13 +114,16 @@ def _curve(path: Path, line: int, fields: Sequence[str]) -> Curve:
             f"{path}:{line}: expected {len(Curve._fields)} fields in an INSTRUMENTATION record, found {len(fields)}"
         )
     given = dict(zip(Curve._fields, (field.strip() for field in fields)))
-    for name, kind in NUMERIC.items():
-        given[name] = kind(_number(path, line, name, given[name]))
+    for name, (kind, limit) in NUMERIC.items():
+        given[name] = kind(_number(path, line, name, given[name], limit))
     return Curve(**given)
 
 
-def _number(path: Path, line: int, what: str, text: str) -> float:
+def _number(path: Path, line: int, what: str, text: str, limit: Range) -> float:
     try:
-        return float(text)
+        number = float(text)
     except ValueError:
-        raise RecordingError(f"{path}:{line}: {what}: expected a number, found {text!r}") from None
+        raise RecordingError(f"{path}:{line}: {what}: expected a number, found {shown(text)}") from None
+    if wrong := limit.wrong(number):
+        raise RecordingError(f"{path}:{line}: {what} {wrong}")
+    return number

@@ -5,6 +5,7 @@ is a start and a step, or another channel's values ("explicit").
 """
 
 import re
+from array import array
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -13,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import limits
 from ..recording import Channel, Recording, RecordingError, Test
 from .isomme_codes import channel_of, is_time
 from .units import si_factor
@@ -34,11 +36,16 @@ class MmeFile(NamedTuple):
         value = self.header.get(key, "")
         return "" if value.upper() == "NOVALUE" else value
 
-    def number(self, key: str) -> float:
+    def number(self, key: str, limit: limits.Range) -> float:
         try:
-            return float(self.get(key))
+            number = float(self.get(key))
         except ValueError:
-            raise RecordingError(f"{key!r}: expected a number, found {self.header.get(key, 'nothing')!r}") from None
+            raise RecordingError(
+                f"{key!r}: expected a number, found {limits.shown(self.header.get(key))}"
+            ) from None
+        if wrong := limit.wrong(number):
+            raise RecordingError(f"{key!r} {wrong}")
+        return number
 
     @property
     def code(self) -> str:
@@ -83,19 +90,25 @@ def read(path: Path) -> Recording:
     if any(track.code[0] == "B" and track.channel.quantity == "force" for track in tracks):
         notes.append("barrier forces keep their recorded sign; a model expects compression to be positive")
     source = [header.get("laboratory name"), header.get("date of the test"), headers[0].name]
-    test = Test(
-        id=header.get("test number") or header.get("laboratory test ref. number") or headers[0].stem,
-        channels=_unique([track.channel for track in tracks]),
-        title=header.get("title") or header.get("type of the test") or header.get("test type"),
-        source=", ".join(filter(None, source)),
-        initial_velocity=_initial_velocity(header, tracks, notes),
-        notes=tuple(notes),
-    )
-    return Recording(test, time_ns, values)
+    velocity = _initial_velocity(header, tracks, notes)
+    try:
+        test = Test(
+            id=header.get("test number") or header.get("laboratory test ref. number") or headers[0].stem,
+            channels=_unique([track.channel for track in tracks]),
+            title=header.get("title") or header.get("type of the test") or header.get("test type"),
+            source=", ".join(filter(None, source)),
+            initial_velocity=velocity,
+            notes=tuple(notes),
+        )
+        return Recording(test, time_ns, values)
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from None
 
 
 def _read_file(file: Path) -> MmeFile:
     try:
+        if wrong := limits.file_wrong(file, limits.HEADER_FILE if file.suffix.lower() == ".mme" else limits.CURVE_FILE):
+            raise RecordingError(f"{file}: {wrong}")
         data = file.read_bytes()
     except OSError as error:
         raise RecordingError(f"{file}: cannot be read: {error.strerror or error}") from None
@@ -104,7 +117,7 @@ def _read_file(file: Path) -> MmeFile:
     except UnicodeDecodeError:  # older editions of the standard
         lines = data.decode("latin-1").splitlines()
     header: dict[str, str] = {}
-    values: list[float] = []
+    values = array("d")
     for number, line in enumerate(lines, start=1):
         key, colon, value = line.partition(":")
         if colon and not values:
@@ -113,7 +126,7 @@ def _read_file(file: Path) -> MmeFile:
             try:
                 values.append(float(line))
             except ValueError:
-                raise RecordingError(f"{file}:{number}: expected a number, found {line.strip()[:40]!r}") from None
+                raise RecordingError(f"{file}:{number}: expected a number, found {limits.shown(line.strip())}") from None
     return MmeFile(file, header, np.array(values))
 
 
@@ -131,7 +144,7 @@ def _tracks(files: Sequence[MmeFile]) -> tuple[list[Track], list[str]]:
                 raise RecordingError(f"its status is {status!r}" if status in FAILED else "it has no values")
             unit = file.get("unit")
             channel = channel_of(file.code, f"{file.file.name}: {file.code}, {unit}", several)
-            values = si_factor(channel.quantity, unit) * file.values
+            values = limits.valid_values(file.values, si_factor(channel.quantity, unit))
             tracks.append(Track(file.code, channel, _time_ns(file, by_code), values))
         except RecordingError as why:
             notes.append(f"left out, {file.file.name}: {why}")
@@ -149,7 +162,10 @@ def _time_ns(file: MmeFile, by_code: Mapping[str, MmeFile]) -> np.ndarray:
         if len(seconds) != n:
             raise RecordingError(f"it has {n} values, its time channel {name} has {len(seconds)}")
     else:
-        seconds = file.number("time of first sample") + np.arange(n) * file.number("sampling interval")
+        start, step = file.number("time of first sample", limits.TIME), file.number("sampling interval", limits.PERIOD)
+        seconds = start + np.arange(n) * step
+    if wrong := limits.times_wrong(seconds):
+        raise RecordingError(wrong)
     time_ns = np.rint(seconds * 1e9).astype(np.int64)
     if np.any(np.diff(time_ns) <= 0):
         raise RecordingError("its time does not increase from sample to sample")
@@ -168,6 +184,8 @@ def _common_time(path: Path, tracks: Sequence[Track], notes: list[str]) -> tuple
         raise RecordingError(
             f"{path}: mixed sample times: channels are sampled between each other's samples; use one time base"
         )
+    if wrong := limits.size_wrong(len(time_ns), len(used)):
+        raise RecordingError(f"{path}: {wrong}")
     values = np.full((len(time_ns), len(used)), np.nan)
     for column, track in enumerate(used):
         values[np.searchsorted(time_ns, track.time_ns), column] = track.values
@@ -196,6 +214,8 @@ def _initial_velocity(header: MmeFile, tracks: Sequence[Track], notes: list[str]
         if test_object and stated:
             try:
                 speed = float(stated[1]) * si_factor("velocity", stated[2] or "m/s")
+                if wrong := limits.VELOCITY.wrong(speed):
+                    raise RecordingError(wrong)
             except ValueError as error:
                 raise RecordingError(f"{header.file}: {key}: {error}") from None
             bodies = dict.fromkeys(track.channel.body for track in tracks if track.code[0] == test_object[1])

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import limits
 from ..recording import Channel, Recording, RecordingError, Test
 from .ev5 import Curve, Header, read_header
 from .nhtsa_names import axis_of, body_of, channel_names
@@ -69,22 +70,29 @@ def read(path: Path, cells: bool = False) -> Recording:
     left_out += [(track.curve, f"sampled at another rate than {1e6 / step:g} Hz") for track in other]
     tracks = [track for track in tracks if track.curve.step == step]
     start, end = min(track.first for track in tracks), max(track.end for track in tracks)
+    if wrong := limits.size_wrong(end - start, len(tracks)):
+        raise RecordingError(f"{path}: from the first sample of any curve to the last, the test {wrong}")
 
     columns, notes = _body_means(tracks, start, end)
     barrier, of_barrier = _barrier(header, tracks, start, end, keep_cells=cells)
     columns |= barrier
     columns |= {track.channel: track.on(start, end) for track in tracks if track.curve.vehicle != 0}
     notes = [*_about(header), *notes, *of_barrier, *_short(columns, start, step), *_summary(left_out)]
-    test = Test(
-        id=header.number,
-        channels=tuple(columns),
-        title=header.title,
-        source=f"NHTSA Vehicle Crash Test Database, test {header.number}: {header.laboratory}, {header.date}",
-        initial_velocity=_initial_velocity(tracks),
-        notes=tuple(notes),
-    )
+    if not columns:
+        raise RecordingError(f"{path}: no curve but of the barrier's cells, and their sum cannot be made")
     time_ns = np.rint(np.arange(start, end) * (step * 1e3)).astype(np.int64)
-    return Recording(test, time_ns, np.stack(list(columns.values()), axis=1))
+    try:
+        test = Test(
+            id=header.number,
+            channels=tuple(columns),
+            title=header.title,
+            source=f"NHTSA Vehicle Crash Test Database, test {header.number}: {header.laboratory}, {header.date}",
+            initial_velocity=_initial_velocity(tracks),
+            notes=tuple(notes),
+        )
+        return Recording(test, time_ns, np.stack(list(columns.values()), axis=1))
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from None
 
 
 def _headers(folder: Path) -> list[Path]:
@@ -112,24 +120,38 @@ def _read_track(header_file: Path, curve: Curve, name: str, body: str) -> Track:
     quantity = quantity_of(curve.unit)
     if quantity is None:
         raise Unusable(f"unit {curve.unit} has no ROS message")
+    if limits.PERIOD.wrong(curve.step * 1e-6):
+        raise Unusable(f"its step of {curve.step:g} us is none")
     file = header_file.with_name(f"{header_file.stem}.{curve.number:03d}")
     if not file.is_file():
         raise Unusable("no data file")
-    try:
-        table = np.loadtxt(file, ndmin=2)
-    except (ValueError, OSError) as error:
-        raise Unusable(f"{file.name} is damaged ({error})") from None
-    if table.shape[1:] != (2,) or not len(table):
-        raise Unusable(f"{file.name}: expected the two columns time and value")
+    table = _table(file)
+    if wrong := limits.times_wrong(table[:, 0]):
+        raise Unusable(f"{file.name}: {wrong}")
     index = table[:, 0] / (curve.step * 1e-6)
     first = round(index[0])
     if np.any(np.abs(index - first - np.arange(len(index))) > ON_GRID):
         raise Unusable(f"{file.name}: its times are not the header's steps of {curve.step:g} us")
-    values = table[:, 1] * si_factor(quantity, curve.unit)
+    values = limits.valid_values(table[:, 1], si_factor(quantity, curve.unit))
     if until:
-        values = values[: max(0, round(float(until[1]) * 1e3 / curve.step) - first)]
+        ends = min(float(until[1]), limits.TIME.highest * 1e3)  # ms
+        values = values[: max(0, round(ends * 1e3 / curve.step) - first)]
     source = f"{file.name}: {curve.comment.split(':')[0]}, {curve.unit}, prefilter {curve.prefilter} Hz"
     return Track(curve, Channel(name, quantity, body, axis_of(curve), source), first, values)
+
+
+def _table(file: Path) -> np.ndarray:
+    """(n, 2) time in s and value. Raises Unusable."""
+    try:
+        if wrong := limits.file_wrong(file, limits.CURVE_FILE):
+            raise Unusable(f"{file.name} {wrong}")
+        lines = file.read_text(encoding="latin-1").splitlines()
+        table = np.loadtxt(lines, ndmin=2) if any(line.strip() for line in lines) else np.empty((0, 2))
+    except (ValueError, OSError) as error:
+        raise Unusable(f"{file.name} is damaged ({limits.shown(str(error))})") from None
+    if table.shape[1:] != (2,) or not len(table):
+        raise Unusable(f"{file.name}: expected the two columns time and value")
+    return table
 
 
 def _body_means(tracks: Sequence[Track], start: int, end: int) -> tuple[dict[Channel, np.ndarray], list[str]]:

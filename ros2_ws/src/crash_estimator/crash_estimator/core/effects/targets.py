@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from itertools import permutations
 
+from crash_replay.limits import NUMBER
 from crash_replay.recording import Test
 
 from ..structure import EffectSpec, ModelError, Structure
@@ -41,6 +42,18 @@ def possible_targets(structure: Structure, effect: Effect, test: Test | None = N
     return [c.name for c in test.channels if c.quantity == "acceleration" and c.name not in used]
 
 
+def check_effects(structure: Structure, effects: Mapping[str, Effect]) -> None:
+    """Those of a model, as far as can be said without a test; raises ModelError with one line and where it is."""
+    there = [(spec.type, spec.target) for spec in structure.effects]
+    for place, spec in enumerate(structure.effects):
+        try:
+            checked(structure, spec, effects)
+            if there.index((spec.type, spec.target)) < place:
+                raise ModelError(f"model {structure.name}: effect {spec.type} acts on {spec.target} twice")
+        except ModelError as error:
+            raise ModelError(str(error), ("effects", place)) from None
+
+
 def checked(structure: Structure, spec: EffectSpec, effects: Mapping[str, Effect], test: Test | None = None) -> Effect:
     """The effect that a model's entry means.
 
@@ -59,7 +72,7 @@ def checked(structure: Structure, spec: EffectSpec, effects: Mapping[str, Effect
     if spec.coefficient is not None:
         _admissible(f"{what} on {spec.target}", spec.coefficient, effect)
     for name, value in spec.shape.items():
-        if not value > 0.0:
+        if not 0.0 < value <= NUMBER.highest:
             raise ModelError(f"{what} on {spec.target}: {name} must be above 0, got {value:g}")
     bodies = [body.name for body in structure.bodies]
     for role in ("host", "touches", "taken_from"):
@@ -71,6 +84,8 @@ def checked(structure: Structure, spec: EffectSpec, effects: Mapping[str, Effect
 
 def _admissible(what: str, coefficient: float, effect: Effect) -> None:
     """Raises ModelError where a coefficient is outside the effect's physical limits."""
+    if wrong := NUMBER.wrong(coefficient):
+        raise ModelError(f"{what}: coefficient {wrong}")
     low, high = (0.0, float("inf")) if isinstance(effect, StaticFactor) else (effect.low, effect.high)
     if not low <= coefficient <= high:
         limits = f"not below {low:g}" if high == float("inf") else f"from {low:g} to {high:g}"

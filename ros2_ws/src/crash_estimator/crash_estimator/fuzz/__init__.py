@@ -1,0 +1,1 @@
+"""Input that is wrong on purpose: whatever comes, it is taken or refused with one line (`make fuzz`)."""
