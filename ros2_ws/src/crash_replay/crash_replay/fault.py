@@ -20,8 +20,8 @@ INTERRUPTED, NOBODY_READS = 128 + signal.SIGINT, 128 + signal.SIGPIPE
 ENDING = (signal.SIGTERM, signal.SIGHUP)
 
 TRACEBACK = "CRASH_TRACEBACK"
-LONGEST = 500
-"""Characters of an exception's text that are worth reading."""
+LONGEST = 1000
+"""Characters of an error that are worth reading, or a little more: its beginning and its end."""
 
 
 class Fault(ValueError):
@@ -115,8 +115,9 @@ def tell(line: str) -> None:
 
 
 def one_line(text: str) -> str:
-    """Line ends as spaces, and whatever else does not print as it can be seen."""
-    return text if text.isprintable() else visible(" ".join(text.split()))
+    """Line ends as spaces, whatever else does not print as it can be seen, and no more than can be read."""
+    line = text if text.isprintable() else visible(" ".join(text.split()))
+    return line if len(line) <= LONGEST else f"{line[: LONGEST // 2]} ... {line[-LONGEST // 2 :]}"
 
 
 def of_the_program(error: BaseException) -> str:
@@ -124,7 +125,6 @@ def of_the_program(error: BaseException) -> str:
     if os.environ.get(TRACEBACK):
         traceback.print_exception(error)
     what = one_line(f"{type(error).__name__}: {error}" if str(error) else type(error).__name__)
-    what = what if len(what) <= LONGEST else f"{what[:LONGEST]} ..."
     return f"a fault of the program: {what} (at {_where(error)}; {TRACEBACK}=1 shows the traceback)"
 
 

@@ -58,10 +58,6 @@ UNPACKED = Range(0, 4 * 2**30, "bytes", "of a bag: its numbers take a tenth of t
 UNPACKED_SMALL, UNPACKED_RATIO = 16_000_000, 100
 """Bytes to which any bag may unpack, and how many times its size a larger one: what sensors say packs 3 to 20 times."""
 
-# of what is said
-LINE = 1000
-"""Characters of an error, or a little more."""
-
 # of a message
 MESSAGE = Range(0, 64_000_000, "bytes", "a block of 10 000 samples of 800 channels")
 
@@ -72,12 +68,6 @@ def shown(value: Any) -> str:
         return "nothing"
     text = _SHORT.repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-def one_line(text: str) -> str:
-    """An error's text as one that a terminal can show, whatever a file or message has put into it."""
-    line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
-    return line if len(line) <= LINE else f"{line[: LINE // 2]} ... {line[-LINE // 2 :]}"
 
 
 class _Short(Repr):

@@ -31,16 +31,14 @@ def spin(executor: Executor, until: Future) -> None:
 
 def run(
     make: Callable[[], Node],
-    at_fault: tuple[type[Exception], ...],
     until: Callable[[Node], Future] = lambda node: Future(),
     close: Callable[[Node], str | None] = lambda node: None,
 ) -> int:
     """Make a node and run it until the future is done or a signal ends it -> exit status.
 
-    at_fault: what may be raised that is no fault of the program, beside `Fault`; close: called at the end, gives a line
-    on what is incomplete, which then is the exit status as well.
+    close: called at the end, gives a line on what is incomplete, which then is the exit status as well.
     """
-    return guarded(lambda: _run(make, until, close), also=(*at_fault, ParameterException))
+    return guarded(lambda: _run(make, until, close), also=(ParameterException,))
 
 
 def _run(make: Callable[[], Node], until: Callable[[Node], Future], close: Callable[[Node], str | None]) -> int:

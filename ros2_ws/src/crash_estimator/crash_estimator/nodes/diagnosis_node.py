@@ -296,7 +296,7 @@ class DiagnosisNode(Node):
 
 
 def main() -> int:
-    return run(DiagnosisNode, (ModelError, RecordingError), until=lambda node: node.done, close=close)
+    return run(DiagnosisNode, until=lambda node: node.done, close=close)
 
 
 def close(node: DiagnosisNode) -> str:

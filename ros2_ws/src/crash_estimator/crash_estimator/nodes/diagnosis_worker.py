@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crash_replay.bag import read_bag
+from crash_replay.fault import Fault
 from crash_replay.recording import Channel, Recording, RecordingError, Test
 
 from ..core.compile_cache import compiling_said
@@ -75,7 +76,7 @@ DEATHS = 3
 """Times that the process may end by itself, in all, before no other one is started: a killed one is not its own fault."""
 
 
-class WorkerError(RuntimeError):
+class WorkerError(Fault):
     """The process ends again and again; the message is one line."""
 
 

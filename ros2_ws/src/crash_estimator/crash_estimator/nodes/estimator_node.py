@@ -270,7 +270,7 @@ class EstimatorNode(Node):
 
 
 def main() -> int:
-    return run(EstimatorNode, (ModelError, RecordingError, ParameterError), close=lambda node: node.attending.leave())
+    return run(EstimatorNode, close=lambda node: node.attending.leave())
 
 
 if __name__ == "__main__":

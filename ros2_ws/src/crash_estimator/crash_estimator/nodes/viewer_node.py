@@ -166,7 +166,7 @@ def structure_named(paths: Sequence[str], name: str) -> Structure | None:
 
 
 def main() -> int:
-    return run(ViewerNode, (OSError, ParameterError, ModelError, RecordingError), until=lambda node: node.done, close=close)
+    return run(ViewerNode, until=lambda node: node.done, close=close)
 
 
 def close(node: ViewerNode) -> None:
