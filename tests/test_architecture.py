@@ -50,7 +50,7 @@ def sources_with(pattern: str, *but: str) -> list[str]:
 
 def test_one_place_prints():
     """What is printed goes through `say` or `tell`, which show foreign text and tell of a full disk."""
-    elsewhere = ("record_node.py", "speed.py")  # the benchmark's progress: its own words, on standard error
+    elsewhere = ("speed.py",)  # the benchmark's progress: its own words, on standard error
     assert sources_with(r"(?<![\w.])print\(", "said.py", "fault.py", *elsewhere) == []
 
 
@@ -63,7 +63,7 @@ def test_one_place_writes_files():
 
 
 def test_every_main_is_guarded():
-    unguarded = ("warm_up.py", "diagnosis_worker.py", "speed_relay.py", "record_node.py")  # started by others of ours
+    unguarded = ("warm_up.py", "diagnosis_worker.py", "speed_relay.py")  # started by others of ours
     mains = [file for file in PACKAGES.rglob("*.py") if file.name not in unguarded and "def main(" in file.read_text()]
     assert len(mains) > 10
     assert [file.name for file in mains if not re.search(r"guarded\(|return run\(", file.read_text())] == []

@@ -107,7 +107,7 @@ def test_test_topic_of_another_type(tmp_path):
 
 def test_no_samples(tmp_path):
     assert error(write_messages(tmp_path / "b", SMALL, [])).startswith(
-        "has no samples: no message on any /channels/<name>"
+        "has no samples: no message on /samples, nor on any /channels/<name>"
     )
 
 

@@ -2,7 +2,7 @@
 
 Every topic but `/test` has a standard type, so a bag opens in Foxglove, PlotJuggler and Rerun without
 our packages. A stamp is time_zero plus the time since the impact. The same recording and name give the
-same bytes.
+same bytes. What `record` makes of a replay has `/samples` instead, and is read as well.
 """
 
 import re
@@ -19,6 +19,7 @@ from .channel_messages import CARRIERS, SECOND, decode, encode
 from .message_types import decode_test, encode_test
 from .output import written
 from .recording import Channel, Recording, RecordingError, Test
+from .samples_in_bag import SAMPLES_TOPIC, read_samples
 
 TEST_TOPIC, TEST_TYPE = "/test", "crash_msgs/msg/TestInfo"
 CHANNEL_TOPICS = "/channels/"
@@ -97,13 +98,15 @@ def _check_free(path: Path, overwrite: bool) -> None:
 def read_bag(path: str | Path, recover: bool = False) -> Recording:
     """The recording in a rosbag2 folder or in one .mcap file, ours or recorded from a replay's topics.
 
-    Channels are aligned by their messages' header stamps; where one lacks a stamp of the others its
-    value is NaN, and a note says so. With `recover`, a bag that was cut off gives what is intact.
+    Where the bag has `/samples`, as `record` writes them, each number of any pass is one sample. Else channels are
+    aligned by their messages' header stamps; where one lacks a stamp of the others its value is NaN. Notes say what is
+    missing. With `recover`, a bag that was cut off gives what is intact.
 
     Raises RecordingError with one line that names the file, the topic and what to do.
     """
     path = Path(path)
-    topics, broken = read_topics(bag_files(path), lambda topic: topic.startswith((TEST_TOPIC, CHANNEL_TOPICS)))
+    wanted = (TEST_TOPIC, SAMPLES_TOPIC, CHANNEL_TOPICS)
+    topics, broken = read_topics(bag_files(path), lambda topic: topic.startswith(wanted))
     if broken and not (recover and TEST_TOPIC in topics):
         way_out = (
             f"`import {path} --recover --to NEW` copies what is intact" if TEST_TOPIC in topics else "nothing is intact"
@@ -111,6 +114,27 @@ def read_bag(path: str | Path, recover: bool = False) -> Recording:
         raise RecordingError(f"{path}: {broken}: {way_out}")
     test, time_zero, expected = _read_test(path, topics)
     notes = [f"recovered from a damaged bag: {broken}"] if broken else []
+    samples = topics.get(SAMPLES_TOPIC)
+    if samples is not None and samples.messages:
+        times, values = read_samples(f"{path}: topic {SAMPLES_TOPIC}", samples, len(test.channels), expected)
+    else:
+        test, stamps, values = _read_channels(path, topics, test, notes)
+        times = stamps - time_zero
+    if len(times) < expected:
+        notes.append(f"{len(times)} of the {expected} samples that the test had are in the bag")
+    try:
+        recording = Recording(replace(test, notes=test.notes + tuple(notes)), times, values)
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from None
+    if not recording.has_values:
+        raise RecordingError(f"{path}: no channel has a valid value at any sample: there is nothing in it to use")
+    return recording
+
+
+def _read_channels(
+    path: Path, topics: dict[str, Topic], test: Test, notes: list[str]
+) -> tuple[Test, np.ndarray, np.ndarray]:
+    """The test with the channels that are there, their stamps (n,) ns and values (n, channels)."""
     columns, kept = {}, []
     for channel in test.channels:
         topic = topics.get(CHANNEL_TOPICS + channel.name)
@@ -124,19 +148,10 @@ def read_bag(path: str | Path, recover: bool = False) -> Recording:
             notes.append(f"{name}: left out, {TEST_TOPIC} does not list it")
     if not kept:
         raise RecordingError(
-            f"{path}: has no samples: no message on any {CHANNEL_TOPICS}<name> that {TEST_TOPIC} lists"
+            f"{path}: has no samples: no message on {SAMPLES_TOPIC}, nor on any {CHANNEL_TOPICS}<name> that "
+            f"{TEST_TOPIC} lists"
         )
-    stamps, values = _align(path, kept, columns, notes)
-    if len(stamps) < expected:
-        notes.append(f"{len(stamps)} of the {expected} samples that the test had are in the bag")
-    try:
-        test = replace(test, channels=tuple(kept), notes=test.notes + tuple(notes))
-        recording = Recording(test, stamps - time_zero, values)
-    except RecordingError as error:
-        raise RecordingError(f"{path}: {error}") from None
-    if not recording.has_values:
-        raise RecordingError(f"{path}: no channel has a valid value at any sample: there is nothing in it to use")
-    return recording
+    return replace(test, channels=tuple(kept)), *_align(path, kept, columns, notes)
 
 
 def _read_test(path: Path, topics: dict[str, Topic]) -> tuple[Test, int, int]:
@@ -170,7 +185,7 @@ def _read_channel(path: Path, channel: Channel, topic: Topic) -> tuple[np.ndarra
         k = int(backwards[0]) + 1
         raise RecordingError(
             f"{where}: stamps must increase, but message {k} at {stamps[k] / SECOND:.6f} s follows "
-            f"{stamps[k - 1] / SECOND:.6f} s; a bag recorded from a replay must hold one pass over the test"
+            f"{stamps[k - 1] / SECOND:.6f} s; a bag without {SAMPLES_TOPIC} must hold one pass over the test"
         )
     return stamps, values
 

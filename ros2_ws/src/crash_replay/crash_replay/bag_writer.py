@@ -8,7 +8,7 @@ import json
 from collections.abc import Iterable, Sequence
 from io import StringIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 from mcap.writer import CompressionType, Writer
 from ruamel.yaml import YAML
@@ -32,46 +32,65 @@ class TopicToWrite(NamedTuple):
     qos: dict[str, Any]
 
 
-def write_mcap(
-    file: Path, topics: Sequence[TopicToWrite], messages: Iterable[tuple[int, int, bytes]]
-) -> dict[str, Any]:
-    """Write messages (index of topic, stamp in ns, CDR) in their order; returns rosbag2's description of the bag."""
-    counts = [0] * len(topics)
-    first = last = None
-    with file.open("wb") as stream:
-        writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
-        writer.start(profile="ros2", library="crash_replay")
-        ids = _register(writer, topics)
-        for topic, stamp, data in messages:
-            writer.add_message(ids[topic], log_time=stamp, data=data, publish_time=stamp, sequence=counts[topic])
-            counts[topic] += 1
-            first = stamp if first is None else min(first, stamp)
-            last = stamp if last is None else max(last, stamp)
-        description = _description(file.name, topics, counts, first or 0, last or 0)
-        writer.add_metadata("rosbag2", {"serialized_metadata": _yaml(description)})
-        writer.finish()
-    return description
+class BagWriter:
+    """Writes messages into one MCAP file, topics as they come."""
 
+    def __init__(self, stream: IO[bytes], data_crc: bool):
+        """data_crc: a checksum over all as well as one for each chunk; the stream must then hold nothing else."""
+        self.writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=data_crc)
+        self.writer.start(profile="ros2", library="crash_replay")
+        self.schemas: dict[str, int] = {}  # ids by type
+        self.topics: list[TopicToWrite] = []
+        self.counts: list[int] = []
+        self.first: int | None = None  # ns, log time of the first message
+        self.last = 0  # and of the last
 
-def write_metadata(folder: Path, description: dict[str, Any]) -> None:
-    (folder / "metadata.yaml").write_text(_yaml({"rosbag2_bagfile_information": description}), encoding="utf-8")
-
-
-def _register(writer: Writer, topics: Sequence[TopicToWrite]) -> list[int]:
-    """Channel ids of the topics."""
-    schemas: dict[str, int] = {}
-    ids = []
-    for topic in topics:
-        if topic.type not in schemas:
+    def add_topic(self, topic: TopicToWrite) -> int:
+        """Its index."""
+        if topic.type not in self.schemas:
             definition, _ = typestore().generate_msgdef(topic.type, ros_version=2)
-            schemas[topic.type] = writer.register_schema(topic.type, "ros2msg", definition.encode())
+            self.schemas[topic.type] = self.writer.register_schema(topic.type, "ros2msg", definition.encode())
         # JSON is YAML, and looks the same whatever library writes it
         metadata = {
             "offered_qos_profiles": json.dumps([topic.qos]),
             "topic_type_hash": typestore().hash_rihs01(topic.type),
         }
-        ids.append(writer.register_channel(topic.name, "cdr", schemas[topic.type], metadata))
-    return ids
+        self.writer.register_channel(topic.name, "cdr", self.schemas[topic.type], metadata)  # ids count from 1
+        self.topics.append(topic)
+        self.counts.append(0)
+        return len(self.topics) - 1
+
+    def write(self, topic: int, log_time: int, data: bytes, publish_time: int) -> None:
+        """Times in ns."""
+        count = self.counts[topic]
+        self.writer.add_message(topic + 1, log_time=log_time, data=data, publish_time=publish_time, sequence=count)
+        self.first = log_time if self.first is None else min(self.first, log_time)
+        self.last = max(self.last, log_time)
+        self.counts[topic] += 1
+
+    def finish(self, name: str) -> dict[str, Any]:
+        """End the file -> rosbag2's description of the bag."""
+        description = _description(name, self.topics, self.counts, self.first or 0, self.last)
+        self.writer.add_metadata("rosbag2", {"serialized_metadata": _yaml(description)})
+        self.writer.finish()
+        return description
+
+
+def write_mcap(
+    file: Path, topics: Sequence[TopicToWrite], messages: Iterable[tuple[int, int, bytes]]
+) -> dict[str, Any]:
+    """Write messages (index of topic, stamp in ns, CDR) in their order; returns rosbag2's description of the bag."""
+    with file.open("wb") as stream:
+        writer = BagWriter(stream, data_crc=True)
+        for topic in topics:
+            writer.add_topic(topic)
+        for topic, stamp, data in messages:
+            writer.write(topic, stamp, data, stamp)
+        return writer.finish(file.name)
+
+
+def write_metadata(folder: Path, description: dict[str, Any]) -> None:
+    (folder / "metadata.yaml").write_text(_yaml({"rosbag2_bagfile_information": description}), encoding="utf-8")
 
 
 def _description(

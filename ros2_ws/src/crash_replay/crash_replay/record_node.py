@@ -1,164 +1,230 @@
-"""`record`: writes what estimators and diagnosis publish beside the recording, as MCAP, the same on every run.
+"""`record`: writes what replay, estimators and diagnosis publish into an MCAP file, which is readable at every instant.
 
     ros2 run crash_replay record --ros-args -p to:=estimates.mcap -p wait_for:=2
 
-Start it before the replay, and let the replay wait for it as for the estimators (its own wait_for): it listens to
-`samples` as soon as it hears `wait_for` estimators. It ends when the replay is gone and nothing more comes, or with
-Ctrl-C, and writes the file then; till then it holds all messages.
+It listens to `samples` as soon as it hears `wait_for` estimators, so a replay that waits for it begins when all else is
+heard. It ends when the replay has gone and everybody has said the last word, or by a signal, and says whether the
+recording is complete: on the terminal, in the file and by its exit status. What it has missed itself it asks for.
 """
 
-import signal
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
-import crash_msgs.msg
-import rclpy
-from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
-from rclpy.exceptions import ParameterException
-from rclpy.experimental.events_executor import EventsExecutor
+from crash_msgs.msg import EstimatorState, Ranking, ReplayState, TestInfo
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.signals import SignalHandlerOptions
+from rclpy.serialization import deserialize_message
 from rclpy.task import Future
 
-from .middleware import prepare_middleware
-from .qos import EVERY_SAMPLE, EVERY_SAMPLE_SAID
+from .attendance import GONE
+from .attending import REPLAY, Attending, Progress
+from .completeness import DIAGNOSIS, ESTIMATOR, SILENT_FOR, Completeness, Pass
+from .fault import Fault, NobodyReads
+from .fetching import Fetching
+from .health import Health, HealthReport, Level
+from .listening import Listening
+from .node_parameters import Allowed, declare_parameters, names_in
+from .numbers import Numbers
+from .recorded_topics import NUMBERED, Choice, about, unreadable
 from .recorder import Heard, Recorder
-from .ros_runtime import spin
-
-STAMPED = {
-    f"crash_msgs/msg/{name}": False
-    for name in ("Samples", "Parameters", "Residuals", "Forces", "Event", "Ranking", "Misfit")
-}
-RECORDED = STAMPED | {"crash_msgs/msg/TestInfo": True}
-"""Types of the topics that are recorded, and whether they are latched."""
-
-SAMPLES, ESTIMATES = "crash_msgs/msg/Samples", "crash_msgs/msg/Parameters"
+from .ros_runtime import run
+from .said import say
 
 LOOK = 0.1
 """s between two looks for new topics, and for the end."""
-
-SETTLED = 0.3
-"""s without a new topic after which those that are heard reach this node."""
-
 QUIET = 1.0
-"""s without a message, once the replay is gone, that end the recording."""
+"""s without a message, once all have said their last word, that end the recording."""
+REPLAY_SILENT = 60.0
+"""s of silence after which a replay counts as gone."""
+STOOD_STILL = 2.0
+"""s between two looks that are worth saying."""
+GOES_ON = {"crash_msgs/msg/Attendance", "crash_msgs/msg/ReplayState", "diagnostic_msgs/msg/DiagnosticArray"}
+"""What is said as long as a node is there."""
+
+PARAMETERS = {
+    "to": Allowed("", "the file to write, which must not exist: *.mcap", needed="-p to:=estimates.mcap"),
+    "wait_for": Allowed(1, "estimators to hear before the samples", 0, 1000),
+    "topics": Allowed([""], "names or patterns such as /kalman/*; without any: all but channels and clock"),
+    "exclude": Allowed([""], "topics to leave out, names or patterns"),
+}
 
 
-class RecordError(Exception):
+class RecordError(Fault):
     """Nothing can be recorded; the message is one readable line."""
 
 
 class RecordNode(Node):
-    """Finds the topics by their types and hands what comes to a `Recorder`."""
+    """Finds the topics by their types and hands what comes to a `Recorder` and to the account of what is missing."""
 
     def __init__(self) -> None:
-        super().__init__("record")
-        several = IntegerRange(from_value=0, to_value=1000, step=1)
-        meaning = ParameterDescriptor(description="estimators to hear before the samples", integer_range=[several])
-        self.wait_for = self.declare_parameter("wait_for", 1, meaning).value
-        meaning = ParameterDescriptor(description="the file to write, which must not exist: *.mcap")
-        self.file = reserved(self.declare_parameter("to", "", meaning).value)
-        self.recorder, self.heard = Recorder(), dict[str, str]()  # type by name
-        self.newest = 0.0  # when a topic was found
-        self.replayed = False  # a replay is or was there
-        self.last = time.monotonic()  # when a message came
-        self.done = Future()
-        self.create_timer(LOOK, self._look)
+        super().__init__("record", automatically_declare_parameters_from_overrides=True)
+        asked = declare_parameters(self, PARAMETERS)
+        choice = Choice(names_in(asked["topics"]), names_in(asked["exclude"]))
+        self.recorder = opened(asked["to"])
+        self.attending = Attending(self, "record", self._progress)
+        self.account = Completeness(choice, self.attending.others)
+        self.listening = Listening(self, choice, asked["wait_for"], self._hear)
+        self.fetching = Fetching(self, self.account, self._hear)
+        self.replayed = self.all_said = False  # a replay is or was there; nothing more is to be expected
+        self.last = self.looked = time.monotonic()  # when a message came; when it was looked
+        self.stood_still: list[str] = []
+        self.full: OSError | None = None
+        self.done, self.finished = Future(), False
+        HealthReport(self, "file", self._health)
+        self.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    # what comes
+
+    def _hear(self, topic: Heard, data: bytes) -> None:
+        if self.finished:
+            return
+        if why := unreadable(topic.type, data):
+            return self.get_logger().error(f"{topic.name}: {why}: left out", throttle_duration_sec=10.0)
+        try:
+            new = self.recorder.hear(topic, data)
+        except OSError as error:
+            return self._end_full(error)
+        if topic.type not in GOES_ON:
+            self.last = time.monotonic()
+        try:
+            if new:
+                self._take_account(topic, data)
+        except Exception as error:  # whatever a message that is none of its type makes the middleware say
+            self.get_logger().error(f"{topic.name}: does not decode as {topic.type} ({error}): written as it came")
+
+    def _take_account(self, topic: Heard, data: bytes) -> None:
+        if topic.type in NUMBERED:
+            self.account.of(topic.name).add(about(data))
+        elif topic.type == "crash_msgs/msg/TestInfo":
+            self.account.begin_test(deserialize_message(data, TestInfo).samples)
+        elif topic.type == "crash_msgs/msg/Ranking":
+            ranking = deserialize_message(data, Ranking)
+            if ranking.final:
+                self.account.finals[topic.name.removesuffix("/ranking")] = ranking.run
+        elif topic.type == "crash_msgs/msg/EstimatorState":
+            state = deserialize_message(data, EstimatorState)
+            self.account.revisions[topic.name.removesuffix("/state")] = state.revision
+
+    # what is said of it
+
+    def _progress(self) -> Progress:
+        of = self.account.last_pass
+        reached, given_up, why = of.sent, 0, ""
+        for topic in self.account.samples():
+            written = self.account.of(topic)
+            known = Numbers([*written.last.spans, *written.given_up.spans] if written.run == of.run else [])
+            reached = min(reached, known.reach(of.first))
+            given_up, why = len(written.given_up), written.why
+        done = self.all_said and reached >= of.sent > 0
+        return Progress(of.run, of.total, reached, given_up, done, why, self.listening.ready())
+
+    def _health(self) -> Health:
+        values = {"messages": self.recorder.count, "topics": len(self.recorder.topics)}
+        return Health(Level.OK, f"records {self.recorder.file.name}", values)
 
     def _look(self) -> None:
-        """The samples come last: a replay that waits for this node then starts when all else is heard."""
-        for name, types in self.get_topic_names_and_types():
-            if name in self.heard or types[0] not in RECORDED or not self.count_publishers(name):
-                continue
-            if types[0] != SAMPLES or self._settled():
-                self.heard[name] = types[0]
-                self.newest = time.monotonic()
-                topic = Heard(name, types[0], RECORDED[types[0]])
-                kind = getattr(crash_msgs.msg, topic.type.rpartition("/")[2])
-                self.create_subscription(kind, name, self._hearing(topic), self._qos(name), raw=True)
-                self.get_logger().info(f"recording {name}")
-        if replays := self.count_publishers("replay_state"):
-            self.replayed, self.last = True, time.monotonic()
-        if self.replayed and not replays and time.monotonic() - self.last > QUIET:
+        now = time.monotonic()
+        if now - self.looked > STOOD_STILL:
+            times = (time.strftime("%H:%M:%S", time.localtime(time.time() - ago)) for ago in (now - self.looked, 0.0))
+            self.stood_still.append(" to ".join(times))
+            self.last = now
+        self.looked = now
+        for topic in self.listening.look():
+            self.account.found(topic.name, topic.type)
+        self._see_replay()
+        more, gone, through = self.fetching.look(), self._replay_is_gone(), self._all_are_through()
+        self.all_said = through and not more and now - self.last > QUIET
+        if gone and (self.all_said or now - self.last > SILENT_FOR):
+            self._finish()
+        try:
+            self.recorder.look()
+        except OSError as error:
+            self._end_full(error)
+
+    def _see_replay(self) -> None:
+        state = self.attending.replay_state
+        if state is not None and state.total:
+            finished = state.state == ReplayState.FINISHED
+            self.account.replayed = Pass(state.run, state.first, state.number, state.total, finished)
+
+    def _replay_is_gone(self) -> bool:
+        others = self.attending.others
+        if replays := others.names(REPLAY):
+            return all(others.state(name) in GONE or others.silence(name) > REPLAY_SILENT for name in replays)
+        there = self.count_publishers("replay_state") > 0
+        self.replayed |= there
+        return self.replayed and not there
+
+    def _all_are_through(self) -> bool:
+        return all(self.account.through(name) for name in self.attending.others.names(ESTIMATOR, DIAGNOSIS))
+
+    def _end_full(self, error: OSError) -> None:
+        self.full = error
+        self._finish()
+
+    def _finish(self) -> None:
+        """End by its own will, and not by a signal."""
+        self.finished = True
+        if not self.done.done():
             self.done.set_result(None)
 
-    def _qos(self, topic: str) -> QoSProfile:
-        """What was said before this node came is heard where it is kept."""
-        offered = [info.qos_profile.durability for info in self.get_publishers_info_by_topic(topic)]
-        return EVERY_SAMPLE_SAID if set(offered) == {DurabilityPolicy.TRANSIENT_LOCAL} else EVERY_SAMPLE
+    def end(self) -> str:
+        """End the file -> a line on what is wrong with it, or ""."""
+        file, count = self.recorder.file, self.recorder.count
+        kinds = {topic.type for name, topic in self.listening.heard.items() if name in self.recorder.topics}
+        if kinds <= {"crash_msgs/msg/Attendance"}:  # it hears its own words
+            self.recorder.give_up("nothing came")
+            file.unlink()
+            return "error: nothing came to be recorded: do replay and estimators run, with this ROS_DOMAIN_ID?"
+        self._see_replay()
+        missing = "; ".join(self._missing())
+        try:
+            if not self.full:
+                self.recorder.close(missing)
+        except OSError as error:
+            self.full = error
+        self.attending.leave()
+        if self.full:
+            why = f"{self.full.strerror}: the recording ends here"
+            with suppress(OSError):
+                self.recorder.give_up(why)
+            return f"error: {file}: {why}; what came before can be read"
+        said = f"{file}: {count} messages on {len(self.recorder.topics)} topics"
+        if missing:
+            return f"incomplete: {said}; {missing}"
+        with suppress(Fault, NobodyReads):  # the terminal may be closed
+            say(f"{said}, complete")
+        return ""
 
-    def _settled(self) -> bool:
-        estimators = list(self.heard.values()).count(ESTIMATES)
-        return estimators >= self.wait_for and time.monotonic() - self.newest > SETTLED
+    def _missing(self) -> list[str]:
+        missing = self.account.missing()
+        if not missing:
+            return []
+        others = self.attending.others
+        missing += [f"{name} {others.how(name, others.state(name))}" for name in others.names(REPLAY)]
+        if not self.finished:
+            missing.append("record was told to end")
+        return missing + [f"record stood still from {when}" for when in self.stood_still]
 
-    def _hearing(self, topic: Heard):
-        def hear(data: bytes) -> None:
-            self.last = time.monotonic()
-            self.recorder.hear(topic, data)
 
-        return hear
-
-
-def reserved(name: str) -> Path:
-    """The file of that name, made empty now so that it can be written at the end; raises RecordError."""
+def opened(name: str) -> Recorder:
+    """A recorder to the file of that name; raises RecordError."""
     file = Path(name)
     if file.suffix != ".mcap":
         raise RecordError(f"parameter to must be a file that ends in .mcap, got {name!r}: -p to:=estimates.mcap")
     try:
-        file.touch(exist_ok=False)
+        return Recorder(file)
     except FileExistsError:
         raise RecordError(f"parameter to: {file} exists already: take another name, nothing is overwritten") from None
     except OSError as error:
         hint = f"there is no folder {file.parent}: make it first" if not file.parent.is_dir() else error.strerror
         raise RecordError(f"parameter to: {file} cannot be written: {hint}") from None
-    return file
-
-
-def write(recorder: Recorder, file: Path) -> str:
-    """Write what came; one line on it. Raises RecordError, and leaves no file, where nothing came."""
-    if not recorder.count:
-        file.unlink()
-        raise RecordError("nothing came to be recorded: do replay and estimators run, with this ROS_DOMAIN_ID?")
-    try:
-        recorder.write(file)
-    except OSError as error:
-        raise RecordError(f"{file} cannot be written: {error.strerror}") from error
-    return f"{file}: {recorder.count} messages on {len(recorder.messages)} topics"
 
 
 def main() -> int:
-    prepare_middleware()
-    # Ctrl-C must end the recording between two messages, not take the context away under it.
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        return record(RecordNode())
-    except (RecordError, ParameterException) as error:
-        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
-        return 1
-    finally:
-        rclpy.shutdown()
-
-
-def record(node: RecordNode) -> int:
-    """Hear and write -> exit status."""
-    executor = EventsExecutor()
-    executor.add_node(node)
-
-    def stop(*_) -> None:
-        node.done.set_result(None)
-        executor.wake()
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, stop)
-    try:
-        spin(executor, until=node.done)
-        print(write(node.recorder, node.file), flush=True)
-        return 0
-    finally:
-        executor.shutdown()
-        node.destroy_node()
+    return run(RecordNode, until=lambda node: node.done, close=RecordNode.end)
 
 
 if __name__ == "__main__":

@@ -1,21 +1,34 @@
-"""What a replay's listeners publish, as one MCAP file that is the same for the same messages. No graph here.
+"""Messages into an MCAP file as they come, on disk within a fraction of a second, and readable whatever happens then.
 
-Messages are kept until the end and written in the order of their stamps, those of one instant by topic and in the
-order in which they came: when they happened to arrive does not show.
+The order is that of arrival: log time is when a message was written, publish time its stamp, so that a second pass over
+the test follows the first. What is kept in memory is some 1 kB of index for each chunk.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+import time
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
+from hashlib import blake2b
 from pathlib import Path
 from typing import NamedTuple
 
-from .bag_writer import LATCHED, STREAM, TopicToWrite, write_mcap
+from mcap.data_stream import RecordBuilder
+from mcap.records import Metadata
+
+from .bag_writer import LATCHED, STREAM, BagWriter, TopicToWrite
 from .message_types import typestore
+from .recorded_topics import RANKING, SAID_BY_NODE, STAMPED, sayer_of, stamp_of
+from .whole_file import WholeFile
 
-ENCAPSULATION = 4
-"""Bytes of a serialized message before its fields; the first of these are its stamp."""
-
-SECOND = 1_000_000_000
+SHOWN_AFTER = 0.15
+"""s after which a message is in the file, at the next message or look."""
+ON_DISK_AFTER = 5.0
+"""s after which the system is told to bring the file onto the disk."""
+REMEMBERED = 2000
+"""Messages of a topic that its publisher keeps for late joiners; the publishers of this project keep 200 at most."""
+KEPT_IN_NUMBER = {RANKING, "crash_msgs/msg/Misfit", "crash_msgs/msg/Residuals"}
+"""Types of latched topics of which more than the last message is kept."""
+METADATA = "crash_replay"
+"""The record that says whether the recording is complete, and what is missing."""
 
 
 class Heard(NamedTuple):
@@ -23,49 +36,100 @@ class Heard(NamedTuple):
 
     name: str
     type: str
-    latched: bool  # without a header: written at the first stamp
+    latched: bool
 
 
-def stamp_of(data: bytes) -> int:
-    """ns of the header that a serialized message begins with."""
-    order = "little" if data[1] & 1 else "big"
-    seconds, rest = (data[ENCAPSULATION + k : ENCAPSULATION + k + 4] for k in (0, 4))
-    return int.from_bytes(seconds, order, signed=True) * SECOND + int.from_bytes(rest, order)
+class Repeats:
+    """Notices what a publisher sends again to one who joins late: a recorder that stood still joins a second time."""
+
+    def __init__(self, topic: Heard):
+        self.topic = topic
+        self.last: dict[str, bytes] = {}  # digest of the last message, by node
+        self.recent, self.order = set[bytes](), deque[bytes]()
+
+    def repeated(self, data: bytes) -> bool:
+        digest = blake2b(data, digest_size=16).digest()
+        if self.topic.type in KEPT_IN_NUMBER:
+            if digest in self.recent:
+                return True
+            self.recent.add(digest)
+            self.order.append(digest)
+            if len(self.order) > REMEMBERED:
+                self.recent.discard(self.order.popleft())
+            return False
+        sayer = sayer_of(data) if self.topic.type in SAID_BY_NODE else ""
+        before, self.last[sayer] = self.last.get(sayer), digest
+        return before == digest
 
 
-def tidy(data: bytes, kind: str) -> bytes:
-    """The same message; the middleware leaves whatever was in memory in the gaps between fields."""
-    return bytes(typestore().serialize_cdr(typestore().deserialize_cdr(data, kind), kind))
-
-
-@dataclass
 class Recorder:
-    """Topics and what came on them; `hear` and `write` may be called from different threads one after the other."""
+    """Not for several threads. Every method raises OSError where the disk does not take it."""
 
-    messages: dict[Heard, list[bytes]] = field(default_factory=dict)
-
-    def hear(self, topic: Heard, data: bytes) -> None:
-        self.messages.setdefault(topic, []).append(data)
+    def __init__(self, file: Path):
+        """Raises FileExistsError: nothing is overwritten."""
+        typestore()  # takes its time, when nothing has to be heard yet
+        self.file, self.stream = file, WholeFile(file)
+        self.writer = BagWriter(self.stream, data_crc=False)
+        self.stream.flush()
+        self.topics: dict[str, int] = {}  # indices in the file, by name
+        self.repeats: dict[str, Repeats] = {}  # of latched topics
+        self.log_time = 0  # ns
+        self.held_since: float | None = None  # monotonic s, of the oldest message that is not in the file yet
+        self.syncing, self.disk = Future[None](), ThreadPoolExecutor(1, "sync")
+        self.syncing.set_result(None)
+        self.synced = time.monotonic()
 
     @property
     def count(self) -> int:
-        return sum(map(len, self.messages.values()))
+        return sum(self.writer.counts)
 
-    def write(self, file: Path) -> None:
-        """Write all that came; what has no stamp first, with the first stamp."""
-        topics = sorted(self.messages)
-        stamped = sorted(self._stamped(topics))
-        first = stamped[0][0] if stamped else 0
-        counts = [(k, len(self.messages[topic])) for k, topic in enumerate(topics) if topic.latched]
-        latched = [(k, first, n) for k, count in counts for n in range(count)]
-        ordered = [*latched, *((k, stamp, n) for stamp, k, n in stamped)]
-        write_mcap(
-            file,
-            [TopicToWrite(topic.name, topic.type, LATCHED if topic.latched else STREAM) for topic in topics],
-            ((k, stamp, tidy(self.messages[topics[k]][n], topics[k].type)) for k, stamp, n in ordered),
-        )
+    def hear(self, topic: Heard, data: bytes) -> bool:
+        """False: it was said before, and is not written again."""
+        if topic.latched and self.repeats.setdefault(topic.name, Repeats(topic)).repeated(data):
+            return False
+        if topic.name not in self.topics:
+            written = TopicToWrite(topic.name, topic.type, LATCHED if topic.latched else STREAM)
+            self.topics[topic.name] = self.writer.add_topic(written)
+        self.log_time = max(self.log_time, time.time_ns())  # the clock may be set back
+        stamp = max(0, stamp_of(data)) if topic.type in STAMPED else self.log_time
+        self.writer.write(self.topics[topic.name], self.log_time, data, stamp)
+        if self.held_since is None:
+            self.held_since = time.monotonic()
+        self.look()
+        return True
 
-    def _stamped(self, topics: list[Heard]) -> Iterable[tuple[int, int, int]]:
-        for k, topic in enumerate(topics):
-            if not topic.latched:
-                yield from ((stamp_of(data), k, n) for n, data in enumerate(self.messages[topic]))
+    def look(self) -> None:
+        """To be called often: into the file with what has waited long enough."""
+        now = time.monotonic()
+        if self.held_since is None or now - self.held_since < SHOWN_AFTER:
+            return
+        self.writer.writer.flush()
+        self.held_since = None
+        if now - self.synced > ON_DISK_AFTER and self.syncing.done():
+            self.syncing.result()
+            self.synced, self.syncing = now, self.disk.submit(self.stream.sync)
+
+    def close(self, missing: str) -> None:
+        """End the file; missing: what it lacks of the test, "" where it is complete."""
+        self.writer.writer.flush()
+        self.disk.shutdown()
+        self.writer.writer.add_metadata(METADATA, _metadata(missing))
+        self.writer.finish(self.file.name)
+        self.stream.end_file()
+        self.stream.close()
+
+    def give_up(self, missing: str) -> None:
+        """Leave the file as it is, with a last word where there is room for it: the disk has taken no more."""
+        self.disk.shutdown()
+        self.stream.drop()
+        record = RecordBuilder()
+        Metadata(METADATA, _metadata(missing)).write(record)
+        self.stream.write(record.end())
+        try:
+            self.stream.flush()
+        finally:
+            self.stream.close()
+
+
+def _metadata(missing: str) -> dict[str, str]:
+    return {"complete": "false" if missing else "true", "missing": missing}

@@ -46,8 +46,9 @@ def _run(make: Callable[[], Node], until: Callable[[Node], Future], close: Calla
     # A signal must end the node between two callbacks, not take the context away under the executor.
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     signals: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda number, _: signals.append(number))
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:  # nohup is respected
+            signal.signal(number, lambda number, _: signals.append(number))
     node, executor, incomplete = None, EventsExecutor(), None
     try:
         node = make()

@@ -8,8 +8,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from crash_msgs.srv import Burst
-from mcap.reader import make_reader
 from std_srvs.srv import Trigger
+
+from crash_replay.same_messages import messages_by_topic
 
 from .speed_graph import Graph
 
@@ -77,8 +78,7 @@ def _call(graph: Graph, kind: type, service: str, request) -> None:
     graph.listener.destroy_client(client)
 
 
-def said(file: Path) -> list[tuple[str, bytes]]:
-    """Topic and bytes of each message with parameters or residuals."""
-    with file.open("rb") as stream:
-        found = [(channel.topic, message.data) for _, channel, message in make_reader(stream).iter_messages()]
-    return [(topic, data) for topic, data in found if topic.endswith(("/parameters", "/residuals"))]
+def said(file: Path) -> dict[str, list[tuple[int, bytes]]]:
+    """Stamps and bytes of the messages with parameters and residuals, by topic."""
+    found = messages_by_topic(file)
+    return {topic: messages for topic, messages in found.items() if topic.endswith(("/parameters", "/residuals"))}

@@ -1,0 +1,167 @@
+"""Whether a recording holds what the test has and what the nodes have said of it. No ROS here.
+
+Of the last pass every sample that was sent must be there, of each estimator every estimate of these samples, and of a
+diagnosis its final answer. Where the replay ended before its pass did, the whole test must be there from some pass.
+"""
+
+from typing import NamedTuple
+
+from .attendance import GONE, Attendance, State
+from .numbers import Numbers, Span
+from .recorded_topics import NUMBERED, SAMPLES, About, Choice
+
+ESTIMATOR, DIAGNOSIS = "estimator", "diagnosis"
+ESTIMATES = {"parameters": "Parameters", "residuals": "Residuals", "forces": "Forces"}
+"""Last parts of an estimator's topics, and their types; forces are not said by all."""
+SILENT_FOR = 300.0
+"""s of silence after which a node is no longer waited for."""
+MOST_SPANS = 5
+"""Spans of missing numbers that are listed."""
+
+
+class Pass(NamedTuple):
+    """What the replay has said of its last pass over the test."""
+
+    run: int
+    first: int  # number of its first sample
+    sent: int  # number after that of the last sample sent
+    total: int  # samples of the test
+    finished: bool  # sent is where it was to end
+
+
+class Written:
+    """Which samples the messages of a topic are about."""
+
+    def __init__(self):
+        self.run = 0  # of the last message
+        self.last = Numbers()  # in this run
+        self.all = Numbers()  # in all of this test
+        self.given_up, self.why = Numbers(), ""  # in this run: cannot be had, and why
+
+    def add(self, about: About) -> None:
+        self._begin(about.run)
+        self.last.add(about.number, about.number + about.count)
+        self.all.add(about.number, about.number + about.count)
+
+    def _begin(self, run: int) -> None:
+        """A replay that was started again counts its passes from 0 again."""
+        if run != self.run:
+            self.run, self.last, self.given_up, self.why = run, Numbers(), Numbers(), ""
+
+    def lacks(self, of: Pass) -> list[Span]:
+        """Of the pass, up to what was sent."""
+        return self.last.missing(of.first, of.sent) if self.run == of.run else [(of.first, of.sent)]
+
+    def lacks_some(self, about: About) -> bool:
+        return about.run != self.run or bool(self.last.missing(about.number, about.number + about.count))
+
+    def give_up(self, run: int, span: Span, why: str) -> None:
+        self._begin(run)
+        self.given_up.add(*span)
+        self.why = why
+
+    def lacks_of_test(self, of: Pass) -> Numbers:
+        lacking = Numbers(span for span in self.lacks(of) if span[0] < span[1])
+        for span in [] if of.finished else self.all.missing(0, of.total):
+            lacking.add(*span)
+        return lacking
+
+
+class Completeness:
+    """Keeps account of a recording."""
+
+    def __init__(self, choice: Choice, others: Attendance):
+        self.choice, self.others = choice, others
+        self.written: dict[str, Written] = {}  # by topic, of the types NUMBERED
+        self.types: dict[str, str] = {}  # of the topics that were found
+        self.finals: dict[str, int] = {}  # by diagnosis, run of its last final ranking
+        self.revisions: dict[str, int] = {}  # by estimator, of its model
+        self.total = 0  # samples of the test
+        self.replayed: Pass | None = None
+
+    def found(self, topic: str, kind: str) -> None:
+        self.types[topic] = kind
+        if kind in NUMBERED:
+            self.written.setdefault(topic, Written())
+
+    def begin_test(self, total: int) -> None:
+        self.total, self.replayed, self.finals = total, None, {}
+        self.written = {topic: Written() for topic in self.written}
+
+    def of(self, topic: str) -> Written:
+        return self.written.setdefault(topic, Written())
+
+    def lacks(self, topic: str, about: About) -> bool:
+        """Whether a message about these samples would bring anything."""
+        return self.of(topic).lacks_some(about)
+
+    def give_up(self, topic: str, span: Span, why: str) -> None:
+        """These numbers of the last pass cannot be had."""
+        self.of(topic).give_up(self.last_pass.run, span, why)
+
+    @property
+    def last_pass(self) -> Pass:
+        """As the replay says, or as far as it can be told without one."""
+        if self.replayed:
+            return self.replayed
+        run = max((written.run for written in self.written.values()), default=0)
+        return Pass(run, 0, 0, self.total, finished=False)
+
+    def samples(self) -> list[str]:
+        """The topic, or topics, with samples."""
+        return [topic for topic, kind in self.types.items() if kind == SAMPLES]
+
+    def estimates(self, node: str) -> list[str]:
+        """An estimator's topics that must be complete."""
+        topics = {f"{node}/{name}": f"crash_msgs/msg/{kind}" for name, kind in ESTIMATES.items()}
+        must = [topic for topic, kind in topics.items() if self.choice.wants(topic, kind)]
+        return [topic for topic in must if topic in self.types or not topic.endswith("/forces")]
+
+    def through(self, node: str) -> bool:
+        """Whether nothing more is to be expected of an estimator or a diagnosis."""
+        if self.others.state(node) in GONE or self.others.silence(node) > SILENT_FOR:
+            return True
+        word, of = self.others.word(node), self.last_pass
+        if word.total == 0 or not of.sent:  # it has no test that it could say anything on
+            return True
+        if word.run != of.run:
+            return word.done and bool(word.reason)  # it can say nothing on any pass
+        # where a pass ends before the test does, there is nothing to conclude from
+        return word.done or (of.sent < of.total and word.next >= of.sent)
+
+    def missing(self) -> list[str]:
+        """What the recording lacks: topic, how many of how many, which, and why."""
+        of = self.last_pass
+        if not of.total:
+            return ["no test was heard, so nobody knows what is missing"]
+        missing = [self._missing_of(topic, of, "") for topic in self.samples()]
+        if not self.samples() and self.replayed and self.choice.wants("/samples", SAMPLES):
+            missing.append("samples: the topic was not found")
+        for node in self.others.names(ESTIMATOR):
+            missing += [self._missing_of(topic, of, self._why(node)) for topic in self.estimates(node)]
+        for node in self.others.names(DIAGNOSIS) if of.finished and of.sent == of.total else []:
+            topic = f"{node}/ranking"
+            if self.choice.wants(topic, "crash_msgs/msg/Ranking") and self.finals.get(node) != of.run:
+                missing.append(f"{topic}: no final answer{_because(self._why(node))}")
+        missing += [f"no topic fits {pattern} (parameter topics)" for pattern in self.choice.in_vain(self.types)]
+        return [text for text in missing if text]
+
+    def _missing_of(self, topic: str, of: Pass, why: str) -> str:
+        written = self.of(topic)
+        lacking = written.lacks_of_test(of)
+        if not len(lacking):
+            return ""
+        needed = of.sent - of.first if of.finished else of.total
+        shown = Numbers(lacking.spans[:MOST_SPANS])
+        more = ", ..." if len(lacking.spans) > MOST_SPANS else ""
+        because = "; ".join(dict.fromkeys(filter(None, [why, written.why])))
+        return f"{topic}: {needed - len(lacking)} of {needed}, without {shown}{more}{_because(because)}"
+
+    def _why(self, node: str) -> str:
+        word, state = self.others.word(node), self.others.state(node)
+        how = self.others.how(node, state) if state in (State.LEFT, State.KILLED, State.SILENT) else ""
+        return "; ".join(filter(None, [f"{node} {how}" if how else "", word.reason]))
+
+
+def _because(reason: str) -> str:
+    return f" ({reason})" if reason else ""

@@ -1,0 +1,58 @@
+"""Finds the topics to record as their publishers come, and subscribes to them: to the samples last."""
+
+import time
+from collections.abc import Callable
+from importlib import import_module
+
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from .qos import EVERY_SAMPLE, EVERY_SAMPLE_SAID
+from .recorded_topics import PARAMETERS, SAMPLES, Choice
+from .recorder import Heard
+
+SETTLED = 0.3
+"""s without a new topic after which those that are heard reach this node."""
+
+
+class Listening:
+    def __init__(self, node: Node, choice: Choice, wait_for: int, hear: Callable[[Heard, bytes], None]):
+        """wait_for: estimators to hear before the samples; hear: called with each message, serialized."""
+        self.node, self.choice, self.wait_for, self.hear = node, choice, wait_for, hear
+        self.heard: dict[str, Heard] = {}  # by name
+        self.newest = 0.0  # monotonic s, when a topic was found
+
+    def look(self) -> list[Heard]:
+        """What has been found since the last look; a replay that waits for this node begins when all is heard."""
+        found = []
+        for name, (kind, *_) in self.node.get_topic_names_and_types():
+            if name in self.heard or not self.choice.wants(name, kind) or not self.node.count_publishers(name):
+                continue
+            if kind != SAMPLES or self.settled():
+                found.append(self._subscribe(name, kind))
+        return found
+
+    def settled(self) -> bool:
+        estimators = sum(topic.type == PARAMETERS for topic in self.heard.values())
+        return estimators >= self.wait_for and time.monotonic() - self.newest > SETTLED
+
+    def ready(self) -> bool:
+        """Whether all that is to be recorded reaches this node from now on."""
+        if self.choice.wants("/samples", SAMPLES):
+            return any(topic.type == SAMPLES for topic in self.heard.values())
+        return self.settled()
+
+    def _subscribe(self, name: str, kind: str) -> Heard:
+        qos = self._qos(name)
+        topic = self.heard[name] = Heard(name, kind, latched=qos is EVERY_SAMPLE_SAID)
+        self.newest = time.monotonic()
+        package, _, message = kind.split("/")
+        message_type = getattr(import_module(f"{package}.msg"), message)
+        self.node.create_subscription(message_type, name, lambda data: self.hear(topic, data), qos, raw=True)
+        self.node.get_logger().info(f"recording {name}")
+        return topic
+
+    def _qos(self, topic: str) -> QoSProfile:
+        """What was said before this node came is heard where it is kept."""
+        offered = [info.qos_profile.durability for info in self.node.get_publishers_info_by_topic(topic)]
+        return EVERY_SAMPLE_SAID if set(offered) == {DurabilityPolicy.TRANSIENT_LOCAL} else EVERY_SAMPLE

@@ -1,0 +1,109 @@
+"""Which topics `record` writes, and what it can tell of their messages without making objects of them."""
+
+import struct
+from collections.abc import Iterable, Sequence
+from fnmatch import fnmatchcase
+from typing import NamedTuple
+
+from .channel_messages import CARRIERS, SECOND
+
+SAMPLES, PARAMETERS, RESIDUALS, FORCES = (
+    f"crash_msgs/msg/{name}" for name in ("Samples", "Parameters", "Residuals", "Forces")
+)
+TEST, RANKING = "crash_msgs/msg/TestInfo", "crash_msgs/msg/Ranking"
+NUMBERED = {SAMPLES, PARAMETERS, RESIDUALS, FORCES}
+"""Messages that say which samples they are about."""
+CHANNELS, CLOCK = {carrier.type for carrier in CARRIERS.values()}, "rosgraph_msgs/msg/Clock"
+WITHOUT_STAMP = {TEST, "crash_msgs/msg/Answer", "crash_msgs/msg/Attendance"}
+STAMPED = NUMBERED | {
+    *CHANNELS, CLOCK, RANKING, "crash_msgs/msg/Misfit", "crash_msgs/msg/Event", "crash_msgs/msg/EstimatorState",
+    "crash_msgs/msg/ReplayState", "diagnostic_msgs/msg/DiagnosticArray",
+}  # fmt: skip
+"""Messages that begin with a stamp."""
+SAID_BY_NODE = {"crash_msgs/msg/Answer", "crash_msgs/msg/Attendance"}
+"""Messages of several nodes on one topic, that begin with the node's name."""
+
+BEGINNING = 4
+"""Bytes of a serialized message before its fields."""
+
+
+class Choice(NamedTuple):
+    """Names or patterns such as /kalman/*, with or without the first slash."""
+
+    topics: Sequence[str] = ()  # none: all but those that hold what `samples` holds as well
+    exclude: Sequence[str] = ()
+
+    def wants(self, name: str, kind: str) -> bool:
+        if kind not in STAMPED | WITHOUT_STAMP or (kind in CHANNELS and "/channels/" not in name):
+            return False
+        chosen = fits(name, self.topics) if self.topics else kind not in CHANNELS | {CLOCK}
+        return chosen and not fits(name, self.exclude)
+
+    def in_vain(self, names: Iterable[str]) -> list[str]:
+        """Those of `topics` that no recorded topic fits."""
+        names = list(names)
+        return [pattern for pattern in self.topics if not any(fits(name, [pattern]) for name in names)]
+
+
+def fits(name: str, patterns: Sequence[str]) -> bool:
+    return any(fnmatchcase(name, pattern) or fnmatchcase(name, f"/{pattern}") for pattern in patterns)
+
+
+def stamp_of(data: bytes) -> int:
+    """ns of the stamp that a serialized message begins with."""
+    seconds, rest = struct.unpack_from(f"{order(data)}iI", data, BEGINNING)
+    return seconds * SECOND + rest
+
+
+class About(NamedTuple):
+    """Which samples a message is about: number, ..., number + count - 1 of a pass."""
+
+    run: int
+    number: int
+    count: int
+
+
+def about(data: bytes) -> About:
+    """Of a message of one of the types NUMBERED: stamp, frame, run, number, time_ns (plain CDR, see cdr.py)."""
+    (text,) = struct.unpack_from(f"{order(data)}I", data, BEGINNING + 8)
+    at = _aligned(BEGINNING + 12 + text, 4)
+    (run,) = struct.unpack_from(f"{order(data)}I", data, at)
+    at = _aligned(at + 4, 8)
+    number, count = struct.unpack_from(f"{order(data)}QI", data, at)
+    _expect(data, at + 12 + 8 * count)
+    return About(run, number, count)
+
+
+def sayer_of(data: bytes) -> str:
+    """The node's name that a message of one of the types SAID_BY_NODE begins with."""
+    (length,) = struct.unpack_from(f"{order(data)}I", data, BEGINNING)
+    _expect(data, BEGINNING + 4 + length)
+    return data[BEGINNING + 4 : BEGINNING + 3 + length].decode()
+
+
+def unreadable(kind: str, data: bytes) -> str:
+    """Why nothing can be told of a message of one of these types, or ""."""
+    try:
+        if kind in STAMPED:
+            stamp_of(data)
+        if kind in NUMBERED:
+            about(data)
+        if kind in SAID_BY_NODE:
+            sayer_of(data)
+    except (struct.error, IndexError, UnicodeDecodeError) as error:
+        return f"expected {kind}, found {len(data)} bytes that are none ({error})"
+    return ""
+
+
+def order(data: bytes) -> str:
+    """The message's byte order, as struct writes it."""
+    return "<" if data[1] & 1 else ">"
+
+
+def _expect(data: bytes, end: int) -> None:
+    if len(data) < end:
+        raise struct.error(f"it says that it has {end} at least")
+
+
+def _aligned(at: int, size: int) -> int:
+    return at + (BEGINNING - at) % size
