@@ -83,7 +83,10 @@ def test_of_another_machine_only_silence_tells(scene):
     ("word", "lacks"),
     [
         (KALMAN._replace(next=10), ""),
-        (KALMAN._replace(next=10, missing=3, reason="the replay had ended"), "3 of 10 samples missing (the replay had ended)"),
+        (
+            KALMAN._replace(next=10, missing=3, reason="the replay had ended"),
+            "3 of 10 samples missing (the replay had ended)",
+        ),
         (KALMAN._replace(run=1), "0 of 10 samples (still at work)"),
         (KALMAN._replace(next=6, missing=2), "4 of 10 samples (still at work)"),
         (KALMAN._replace(ready=False, next=0), "0 of 10 samples (not ready yet)"),

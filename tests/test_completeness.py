@@ -156,7 +156,8 @@ def test_who_can_say_nothing_on_this_test_is_not_waited_for_and_is_named():
     graph.say("/mrls", "estimator", next=100, done=True, reason="test T has no channel car_ax")
     assert graph.account.through("/mrls")
     assert graph.account.missing() == [
-        f"/mrls/{name}: 0 of 100, without 0 to 99 (test T has no channel car_ax)" for name in ("parameters", "residuals")
+        f"/mrls/{name}: 0 of 100, without 0 to 99 (test T has no channel car_ax)"
+        for name in ("parameters", "residuals")
     ]
 
 

@@ -44,7 +44,12 @@ def two_lines(_: Path) -> None:
 
 @pytest.mark.parametrize(
     ("take", "outcome"),
-    [(endless, "longer than 0.2 s"), (fault, "KeyError"), (two_lines, "not one printable line"), (lambda _: None, "taken")],
+    [
+        (endless, "longer than 0.2 s"),
+        (fault, "KeyError"),
+        (two_lines, "not one printable line"),
+        (lambda _: None, "taken"),
+    ],
 )
 def test_what_a_failure_is(monkeypatch, take, outcome):
     monkeypatch.setattr(worker, "LONGEST", 0.2)

@@ -55,7 +55,9 @@ def test_csv_times_that_no_crash_has(tmp_path, time):
     assert "rib.csv: sample 1: time" in line
 
 
-@pytest.mark.parametrize("content", [b"", b"\x00" * 100, b"\xff\xfe\x00", b"time," + b"x" * 200_000, b"time\n", b"time,a\n"])
+@pytest.mark.parametrize(
+    "content", [b"", b"\x00" * 100, b"\xff\xfe\x00", b"time," + b"x" * 200_000, b"time\n", b"time,a\n"]
+)
 def test_csv_that_is_no_table(tmp_path, content):
     laid_out(CSV | {"rib.csv": content}, tmp_path)
     assert "rib.csv" in refused(read_source, tmp_path / "rib.csv")
@@ -230,7 +232,9 @@ def test_an_output_whose_lengths_do_not_fit():
 # ---- models, settings, effects
 
 
-@pytest.mark.parametrize("value", ["true", '"400"', "1e308", ".inf", ".nan", "0", "-1", "1" * 400, "[1]", "{a: 1}", "2001-01-01"])
+@pytest.mark.parametrize(
+    "value", ["true", '"400"', "1e308", ".inf", ".nan", "0", "-1", "1" * 400, "[1]", "{a: 1}", "2001-01-01"]
+)
 @pytest.mark.parametrize("key", ["mass: 400.5", "std: 1.0e5", "noise: 2.0"])
 def test_a_model_s_number_that_is_none(tmp_path, key, value):
     folder = changed(MODEL, tmp_path, "model.yaml", key, f"{key.partition(':')[0]}: {value}")
@@ -251,7 +255,11 @@ SEMANTIC = {
     "a channel twice": ("[car_ax]", "[car_ax, car_ax]", ":3: bodies.car.acceleration: "),
     "an effect's target": ("element: car_engine", "element: car_engin", ":19: effects.0: "),
     "an effect": ("type: added_mass", "type: aded_mass", ":20: effects.1: "),
-    "an effect twice": ("{type: added_mass, body: car}", "{type: coulomb_friction, element: car_engine}", ":20: effects.1: "),
+    "an effect twice": (
+        "{type: added_mass, body: car}",
+        "{type: coulomb_friction, element: car_engine}",
+        ":20: effects.1: ",
+    ),
     "a shape constant": ("speed: 0.1", "sped: 0.1", ":19: effects.0: "),
     "a coefficient": ("coefficient: 1810", "coefficient: -1", ":19: effects.0: "),
 }
@@ -265,12 +273,16 @@ def test_what_a_model_means_wrongly_has_file_line_and_key(tmp_path, mistake):
 
 
 def test_a_model_without_an_equation_has_file_line_and_key(tmp_path):
-    text = "name: x\nbodies:\n  a: {motion: a_ax}\n  b: {fixed: true}\nelements:\n  e: {between: [a, b], stiffness: 1}\n"
+    text = (
+        "name: x\nbodies:\n  a: {motion: a_ax}\n  b: {fixed: true}\nelements:\n  e: {between: [a, b], stiffness: 1}\n"
+    )
     (tmp_path / "model.yaml").write_text(text)
     assert "model.yaml:2: bodies: model x: there is no equation" in refused(load_model, tmp_path / "model.yaml")
 
 
-@pytest.mark.parametrize("setting", ["m=" + "1" * 400, "forgetting=nan", "forgetting=inf", "forgetting", "=", "m=1e300000"])
+@pytest.mark.parametrize(
+    "setting", ["m=" + "1" * 400, "forgetting=nan", "forgetting=inf", "forgetting", "=", "m=1e300000"]
+)
 def test_settings_that_are_no_number(setting):
     refused(parse_settings, [setting])
 
@@ -303,7 +315,9 @@ def test_an_effects_file_at_fault(tmp_path, old, new, said):
     assert "mine.py" in line and said in line
 
 
-@pytest.mark.parametrize(("late", "said"), [("sys.exit(0)", "calls sys.exit"), ("1 / 0", "ZeroDivisionError"), ("'x'", "fails")])
+@pytest.mark.parametrize(
+    ("late", "said"), [("sys.exit(0)", "calls sys.exit"), ("1 / 0", "ZeroDivisionError"), ("'x'", "fails")]
+)
 def test_an_effect_that_fails_late_says_who_it_is(tmp_path, late, said):
     folder = changed(EFFECT, tmp_path, "mine.py", BODY, f"return {late} if len(motion.time) > 64 else motion.crush")
     effect = load_effects(folder / "mine.py")["position_damping"]

@@ -86,7 +86,11 @@ MISTAKES = [
     ("[door, rib]", "[door]", "8: elements.door_rib.between: has too few items, found ['door']"),
     ("  rib: {mass: 16.8}", "  rib: 16.8", "4: bodies.rib: should be a mapping, found 16.8"),
     ("  door_rib:", "  door_rib: &a", None),  # anchors are fine
-    ("    tension: none", "    tension: none\n    tension: both", "11: not valid YAML: key 'tension' appears more than once"),
+    (
+        "    tension: none",
+        "    tension: none\n    tension: both",
+        "11: not valid YAML: key 'tension' appears more than once",
+    ),
     ("[door, rib]", "[door, rib", "9: not valid YAML: "),
     (
         "door\n",

@@ -21,7 +21,9 @@ def test_what_is_no_number_in_a_range(value):
 
 
 def test_both_ends_are_in_a_range():
-    assert not any(limits.Range(0.0, 10.0, "s", "").wrong(value) for value in (0, 10, 0.0, np.float64(3.0), np.int64(10)))
+    assert not any(
+        limits.Range(0.0, 10.0, "s", "").wrong(value) for value in (0, 10, 0.0, np.float64(3.0), np.int64(10))
+    )
 
 
 @pytest.mark.parametrize("value", [[[1] * 10**6] * 100, "x" * 10**6, [10**5000], {k: "x" * 10**5 for k in range(1000)}])
@@ -39,7 +41,11 @@ def test_what_is_no_file_is_not_opened(tmp_path):
     (tmp_path / "large").write_bytes(bytes(11))
     size = limits.Range(0, 10, "bytes", "")
     said = {name: limits.file_wrong(tmp_path / name, size) for name in ("pipe", "large", ".")}
-    assert said == {"pipe": "is not a file", "large": "has 11 bytes, more than the 10 allowed", ".": "is a folder, not a file"}
+    assert said == {
+        "pipe": "is not a file",
+        "large": "has 11 bytes, more than the 10 allowed",
+        ".": "is a folder, not a file",
+    }
 
 
 TEST = Test("t", (Channel("a", "force"), Channel("b", "force")))
@@ -105,7 +111,10 @@ def test_samples_that_cannot_be_of_the_test(sent, wrong):
     assert wrong in said if wrong else said == "", said
 
 
-@pytest.mark.parametrize("raw", [b"", b"\x00\x01\x00\x00", bytes(200), b"\x00\x01\x00\x00" + b"\xff" * 60, b"\x00\x01\x00\x00" + bytes(range(256))])
+@pytest.mark.parametrize(
+    "raw",
+    [b"", b"\x00\x01\x00\x00", bytes(200), b"\x00\x01\x00\x00" + b"\xff" * 60, b"\x00\x01\x00\x00" + bytes(range(256))],
+)
 def test_bytes_that_are_no_samples(raw):
     try:
         assert what_is_wrong(received(raw), Kept(TEST), 10)

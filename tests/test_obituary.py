@@ -27,7 +27,9 @@ def test_the_message_is_a_disposal_as_the_protocol_has_it():
     message = disposal(participant)
     assert message[:20] == b"RTPS\x02\x03\x01\x0f" + participant
     assert message[20] == 0x15 and int.from_bytes(message[22:24], "little") == len(message) - 24
-    assert participant + b"\x00\x00\x01\xc1" in message and message.endswith(b"\x71\x00\x04\x00\x00\x00\x00\x03\x01\x00\x00\x00")
+    assert participant + b"\x00\x00\x01\xc1" in message and message.endswith(
+        b"\x71\x00\x04\x00\x00\x00\x00\x03\x01\x00\x00\x00"
+    )
     assert [discovery_port(0, 0), discovery_port(1, 2)] == [7410, 7664]
 
 

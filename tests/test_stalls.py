@@ -114,10 +114,13 @@ def test_a_diagnosis_that_was_stopped_gives_the_same_answer(stage):
     answers: list[Ranking] = []
     stage.node.create_subscription(Ranking, "diagnosis/ranking", answers.append, SAID)
     final = lambda: [answer for answer in answers if answer.final]  # noqa: E731
+    undisturbed = None
     for stop in (False, True):
         answers.clear()
         diagnosis = stage.start("crash_estimator.nodes.diagnosis_node", model=BAGS / "hidden_effect.model.yaml")
-        replay = stage.replay(BAGS / "hidden_effect.mcap", rate=0.1, stderr=subprocess.PIPE, listeners="[diagnosis]", wait_timeout=200.0)
+        replay = stage.replay(
+            BAGS / "hidden_effect.mcap", rate=0.1, stderr=subprocess.PIPE, listeners="[diagnosis]", wait_timeout=200.0
+        )
         stage.spin_until(lambda: answers, "the diagnosis has begun", 4 * PATIENCE)
         if stop:
             diagnosis.send_signal(signal.SIGSTOP)
@@ -131,6 +134,6 @@ def test_a_diagnosis_that_was_stopped_gives_the_same_answer(stage):
         stage.spin_until(lambda: diagnosis.poll() is not None, "it has ended")
         assert diagnosis.returncode == 0
         if stop:
-            assert (given.verdict, given.number, given.ranking) == (whole.verdict, whole.number, whole.ranking)
-            assert (given.rms_before, given.rms_after) == (whole.rms_before, whole.rms_after)
-        whole = given
+            assert (given.verdict, given.number, given.ranking) == (undisturbed.verdict, undisturbed.number, undisturbed.ranking)
+            assert (given.rms_before, given.rms_after) == (undisturbed.rms_before, undisturbed.rms_after)
+        undisturbed = given

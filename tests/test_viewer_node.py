@@ -25,6 +25,7 @@ from crash_estimator.nodes import viewer_messages
 from crash_estimator.viewer.blocks import Block, ForceBlock, ParameterBlock, ResidualBlock
 from crash_replay.middleware import prepare_middleware
 from crash_replay.qos import LATCHED, STREAM
+from crash_replay.recording import RecordingError
 
 NAMES = ("mrls", "ckf")
 SAMPLES = 240

@@ -53,7 +53,9 @@ GONE = (State.LEFT, State.KILLED)
 class Attendance:
     """The last word of each node."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic, host: str = "", ended=has_ended, stopped=is_stopped):
+    def __init__(
+        self, clock: Callable[[], float] = time.monotonic, host: str = "", ended=has_ended, stopped=is_stopped
+    ):
         """host: this machine; ended, stopped: of a process of it."""
         self.clock, self.host = clock, host or this_host()
         self.ended, self.stopped = ended, stopped

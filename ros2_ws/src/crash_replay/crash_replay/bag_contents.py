@@ -43,7 +43,9 @@ def bag_files(path: Path) -> list[Path]:
     return files
 
 
-def read_topics(files: Sequence[Path], wanted: Callable[[str], bool] = lambda topic: True) -> tuple[dict[str, Topic], str]:
+def read_topics(
+    files: Sequence[Path], wanted: Callable[[str], bool] = lambda topic: True
+) -> tuple[dict[str, Topic], str]:
     """Topics by name, and what is wrong with the files ("" for nothing) where they could not be read to the end.
 
     wanted: of which topics the messages are kept. Raises RecordingError where a file is no MCAP at all, or would

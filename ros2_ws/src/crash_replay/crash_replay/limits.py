@@ -92,7 +92,9 @@ def count_wrong(what: str, count: int, limit: Range) -> str:
 def size_wrong(samples: int, channels: int) -> str:
     """Of a test whose numbers would be kept in memory."""
     wrong = count_wrong("has", samples, SAMPLES) or count_wrong("has", channels, CHANNELS)
-    return wrong or count_wrong(f"with {samples} samples of {channels} channels takes", bytes_of(samples, channels), BYTES)
+    return wrong or count_wrong(
+        f"with {samples} samples of {channels} channels takes", bytes_of(samples, channels), BYTES
+    )
 
 
 def bytes_of(samples: int, channels: int) -> int:

@@ -94,7 +94,9 @@ test_from_msg.__test__ = False  # not a pytest function
 
 def _what_is_wrong(message: Any) -> str:
     """With what a TestInfo claims; "" for nothing."""
-    bodies, velocities, displacements = map(len, (message.bodies, message.initial_velocity, message.initial_displacement))
+    bodies, velocities, displacements = map(
+        len, (message.bodies, message.initial_velocity, message.initial_displacement)
+    )
     if not bodies == velocities == displacements or len(set(message.bodies)) != bodies:
         return (
             "expected an initial velocity and displacement for each of different bodies, found "

@@ -1,8 +1,8 @@
 """Parameters of a node from a table: what each is by default, means and may be; what is wrong is one line.
 
-    PARAMETERS = {"every": Allowed(0.002, "s of the crash between two rankings", 1e-5, 1e4)}
-    super().__init__("diagnosis", automatically_declare_parameters_from_overrides=True)
-    given = declare_parameters(self, PARAMETERS)      # {"every": 0.002}
+PARAMETERS = {"every": Allowed(0.002, "s of the crash between two rankings", 1e-5, 1e4)}
+super().__init__("diagnosis", automatically_declare_parameters_from_overrides=True)
+given = declare_parameters(self, PARAMETERS)      # {"every": 0.002}
 """
 
 import re

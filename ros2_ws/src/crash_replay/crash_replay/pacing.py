@@ -7,7 +7,7 @@ from threading import Condition
 from typing import NamedTuple, Protocol
 
 from .fault import Fault
-from .player import Batch, CommandError, Mode, Player, Tally, suitable_block
+from .player import Batch, Mode, Player, Tally, suitable_block
 from .recording import Recording
 from .scheduling import sleep_exactly
 
@@ -50,6 +50,7 @@ class Outlet(Protocol):
     def look(self) -> None: ...  # called where there is time to see what has arrived
     def test_has_arrived(self) -> bool: ...
     def all_have_arrived(self) -> bool: ...
+
     audience: "Listening"
 
 

@@ -1,6 +1,6 @@
 """Kills `record` at random moments, and looks whether what was published half a second before is in the file.
 
-    python -m crash_replay.record_killed --kills 50 --seed 1
+python -m crash_replay.record_killed --kills 50 --seed 1
 """
 
 import argparse

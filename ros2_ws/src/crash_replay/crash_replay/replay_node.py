@@ -46,7 +46,9 @@ class ReplayNode(Node):
         recording = select_channels(read_bag(asked["bag"]), names_in(asked["channels"]), names_in(asked["exclude"]))
         window = samples_within(window_of(asked), recording.time_ns)
         player = Player(recording.time_ns, asked["rate"], asked["loop"], *window)
-        self.topics = topics = ReplayTopics(self, recording, asked["clock"], asked["answer_timeout"] if asked["lockstep"] else None)
+        self.topics = topics = ReplayTopics(
+            self, recording, asked["clock"], asked["answer_timeout"] if asked["lockstep"] else None
+        )
         self.pacing = Pacing(recording, player, topics, self.asked["block"])
         for command in (Player.pause, Player.resume, Player.toggle):
             self.create_service(Trigger, f"~/{command.__name__}", self._on_trigger(command))

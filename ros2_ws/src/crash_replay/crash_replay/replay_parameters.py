@@ -13,7 +13,9 @@ LIVE = ("rate", "loop", "from", "until")
 
 
 PARAMETERS = {
-    "bag": Allowed("", "the recording: a rosbag2 folder or one .mcap file", needed="give a recording, --ros-args -p bag:=PATH"),
+    "bag": Allowed(
+        "", "the recording: a rosbag2 folder or one .mcap file", needed="give a recording, --ros-args -p bag:=PATH"
+    ),
     "rate": Allowed(1.0, "times real time; may be set at any time", LOWEST_RATE, HIGHEST_RATE),
     "start_offset": Allowed(0.0, "s after the first sample at which to begin", 0.0, 1e6),
     "duration": Allowed(0.0, "s to play from there; 0: to the end", 0.0, 1e6),
@@ -31,7 +33,9 @@ PARAMETERS = {
     "wait_for": Allowed(0, "subscribers on samples to wait for; 0: those found within half a second", 0, 1000),
     "listeners": Allowed([""], "names of nodes to wait for, until each says that it is ready"),
     "wait_timeout": Allowed(10.0, "s to wait for them; then the replay ends with exit status 1", 0.0, 3600.0),
-    "finish_timeout": Allowed(300.0, "s after the last sample for nodes that take part to get what they lack", 0.0, 1e5),
+    "finish_timeout": Allowed(
+        300.0, "s after the last sample for nodes that take part to get what they lack", 0.0, 1e5
+    ),
     "clock": Allowed(True, "publish /clock with each message on samples"),
     "progress": Allowed("auto", "keep a progress line; auto: on a terminal", choices=ON_A_TERMINAL),
     "keyboard": Allowed("auto", "take keys, h lists them; auto: on a terminal", choices=ON_A_TERMINAL),

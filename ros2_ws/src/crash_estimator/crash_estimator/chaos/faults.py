@@ -15,6 +15,7 @@ class Disturbed(Protocol):
     def top(self, name: str) -> Member | None: ...  # a process that we have started ourselves
     def process(self, name: str) -> int: ...  # its number; 0: there is none (yet)
     def since_start(self, name: str) -> float: ...  # s since it was started
+
     played: float  # % of the samples
     since_finish: float  # s since the last sample; negative: not yet
 

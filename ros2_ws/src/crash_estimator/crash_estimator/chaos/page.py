@@ -47,4 +47,4 @@ def _faults(case: Case) -> str:
 
 def _failed(rows: Sequence[dict]) -> str:
     failed = [row for row in rows if row["verdict"] == FAILED]
-    return "\n".join(f"- {row['why']}: `make chaos ARGS=\"--case {row['case']}\"`" for row in failed)
+    return "\n".join(f'- {row["why"]}: `make chaos ARGS="--case {row["case"]}"`' for row in failed)

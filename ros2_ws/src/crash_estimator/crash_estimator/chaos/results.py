@@ -31,9 +31,7 @@ def references(cases: Sequence[Case], out: Path) -> dict[str, dict[str, Content]
     return found
 
 
-def rows(
-    cases: Sequence[Case], out: Path, found: Mapping[str, dict[str, Content]], jobs: int
-) -> Iterator[dict]:
+def rows(cases: Sequence[Case], out: Path, found: Mapping[str, dict[str, Content]], jobs: int) -> Iterator[dict]:
     """In the order in which they are done; each is added to the file of results."""
     for row in _in_processes(cases, out, found, jobs):
         with (out / RESULTS).open("a", encoding="utf-8") as file:

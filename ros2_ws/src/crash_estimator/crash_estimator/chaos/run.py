@@ -92,9 +92,7 @@ class Run:
                 send(member.process.pid, signal.SIGINT)
         deadline = time.monotonic() + ENDING
         self.observer.spin(ENDING, lambda: all(m.status is not None for m in members) or time.monotonic() > deadline)
-        return [
-            Ended(m.name, m.status, m.said(), m.disturbed, self._had_all(m.name)) for m in members
-        ]
+        return [Ended(m.name, m.status, m.said(), m.disturbed, self._had_all(m.name)) for m in members]
 
     def _end_all(self) -> None:
         for member in self.tops.values():

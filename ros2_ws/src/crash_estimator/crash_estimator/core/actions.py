@@ -13,8 +13,6 @@ The last three are not linear. They are taken linear about the latest theta: for
     h(theta) = h(theta_0) + H (theta - theta_0),    gradient H,  known h(theta_0) - H theta_0
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from .contact import SpringLaw

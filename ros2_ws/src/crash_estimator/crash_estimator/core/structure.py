@@ -162,7 +162,9 @@ class Structure:
                 if end not in known:
                     near = get_close_matches(end, known, n=1)
                     hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
-                    self._at_fault(f"element {element.name}: no body {end!r}; {hint}", "elements", element.name, "between")
+                    self._at_fault(
+                        f"element {element.name}: no body {end!r}; {hint}", "elements", element.name, "between"
+                    )
         for body in self.bodies:
             self._check_body(body)
         for element in self.elements:

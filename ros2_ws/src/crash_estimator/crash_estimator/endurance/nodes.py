@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-import rclpy
 from crash_msgs.msg import Samples, TestInfo
 
 from crash_replay.bag import read_bag

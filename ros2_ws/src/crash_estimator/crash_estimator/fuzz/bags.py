@@ -33,7 +33,9 @@ def spoilt_bag(rng: Random) -> Files:
     if kind < 0.3:
         return {"small.mcap": spoilt_bytes(rng, files["small.mcap"])}
     if kind < 0.35:
-        return {"small.mcap": MAGIC + _record(1, _text("ros2") + _text("x")) + _chunk(rng) + _record(15, bytes(4)) + MAGIC}
+        return {
+            "small.mcap": MAGIC + _record(1, _text("ros2") + _text("x")) + _chunk(rng) + _record(15, bytes(4)) + MAGIC
+        }
     return {"small.mcap": _written(rng, _spoilt_messages(rng, messages))}
 
 
@@ -55,7 +57,12 @@ def _spoilt_messages(rng: Random, messages: list) -> list[tuple[str, str, int, b
                 spoilt.append(spoilt[k])
             case 4:
                 at = 4 + 4 * rng.randrange(2)
-                spoilt[k] = topic, kind, stamp, data[:at] + struct.pack("<I", rng.choice(INTEGERS) % 2**32) + data[at + 4 :]
+                spoilt[k] = (
+                    topic,
+                    kind,
+                    stamp,
+                    data[:at] + struct.pack("<I", rng.choice(INTEGERS) % 2**32) + data[at + 4 :],
+                )
             case _:
                 spoilt[k] = topic, kind, stamp, spoilt_bytes(rng, data)
         if not spoilt:

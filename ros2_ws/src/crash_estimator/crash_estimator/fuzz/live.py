@@ -53,7 +53,9 @@ def spoil(rng: Random) -> Files:
     files = {}
     for place in range(rng.choice((1, 2, 5))):
         topic = rng.choice(("test", "samples", "samples"))
-        message = TEST_INFO if topic == "test" else samples_to_msg(RECORDING, *_part(rng), rng.choice((0, 1)), TIME_ZERO)
+        message = (
+            TEST_INFO if topic == "test" else samples_to_msg(RECORDING, *_part(rng), rng.choice((0, 1)), TIME_ZERO)
+        )
         files[f"{place}.{topic}"] = spoilt_message(rng, message)
     return files
 

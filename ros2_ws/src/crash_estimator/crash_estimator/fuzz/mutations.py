@@ -31,8 +31,38 @@ PYTHON = (
 )  # fmt: skip
 TOKEN = re.compile(r"[-+]?\d[\d.eE+-]*|[A-Za-z_][\w']*|[^\w\s]|\s+")
 BYTES = (b"\x00", b"\xff", b"\xff\xfe", b"\xc3\x28", b"\r", b"\n", b"\x1a", b"\x1b[2J", b"\x80" * 50)
-INTEGERS = (0, 1, -1, 2**31 - 1, -(2**31), 2**31, 2**32 - 1, 2**63 - 1, -(2**63), 2**63, 2**64 - 1, 10**12, 10**8, 10**7 + 1)
-FLOATS = (0.0, -1.0, 1.0, float("nan"), float("inf"), -float("inf"), 1e308, -1e308, 5e-324, 1e12, 1e13, 1e100, 1e-9, 1e4)
+INTEGERS = (
+    0,
+    1,
+    -1,
+    2**31 - 1,
+    -(2**31),
+    2**31,
+    2**32 - 1,
+    2**63 - 1,
+    -(2**63),
+    2**63,
+    2**64 - 1,
+    10**12,
+    10**8,
+    10**7 + 1,
+)
+FLOATS = (
+    0.0,
+    -1.0,
+    1.0,
+    float("nan"),
+    float("inf"),
+    -float("inf"),
+    1e308,
+    -1e308,
+    5e-324,
+    1e12,
+    1e13,
+    1e100,
+    1e-9,
+    1e4,
+)
 
 
 def spoilt(rng: Random, files: Files, words: tuple[str, ...] = WORDS) -> Files:
@@ -99,7 +129,9 @@ def _spoilt_lines(rng: Random, content: bytes) -> bytes:
         case 4:
             lines[k] = lines[k] * rng.choice((2, 100, 3000))
         case _:
-            lines[k] = lines[k].replace(rng.choice((b"|", b",", b":", b" ")), rng.choice((b"", b"|", b",,", b"::", b"\t")))
+            lines[k] = lines[k].replace(
+                rng.choice((b"|", b",", b":", b" ")), rng.choice((b"", b"|", b",,", b"::", b"\t"))
+            )
     return b"\n".join(lines)
 
 

@@ -86,7 +86,8 @@ def _take_samples(folder: Path) -> None:
 
 
 CHANNEL_MESSAGES = [
-    channel_to_msg(channel, stamp(TIME_ZERO), RECORDING.values.item(12, k)) for k, channel in enumerate(RECORDING.test.channels)
+    channel_to_msg(channel, stamp(TIME_ZERO), RECORDING.values.item(12, k))
+    for k, channel in enumerate(RECORDING.test.channels)
 ]
 
 
@@ -135,7 +136,9 @@ def _take_parameter(folder: Path) -> None:
     if "node" in given:
         checked(NODES[given["node"]], given["name"], given["value"])
         return
-    make_estimator(load_model("frontal_single"), _test_of_model(), given["method"], **parse_settings([given["setting"]]))
+    make_estimator(
+        load_model("frontal_single"), _test_of_model(), given["method"], **parse_settings([given["setting"]])
+    )
 
 
 def _test_of_model() -> Test:
@@ -169,7 +172,9 @@ def _take_request(folder: Path) -> None:
 
 TARGETS: dict[str, Target] = {
     "CSV and YAML": Target(20, lambda rng: spoilt(rng, CSV), _read("rib.csv")),
-    "names file": Target(6, lambda rng: {**CSV, **spoilt(rng, {"names.yaml": NAMED["names.yaml"]})}, _read("rib.csv", names="names.yaml")),
+    "names file": Target(
+        6, lambda rng: {**CSV, **spoilt(rng, {"names.yaml": NAMED["names.yaml"]})}, _read("rib.csv", names="names.yaml")
+    ),
     "EV5 folder": Target(20, lambda rng: spoilt(rng, EV5), _read(".")),
     "ISO-MME folder": Target(20, lambda rng: spoilt(rng, MME), _read(".")),
     "bag": Target(20, spoilt_bag, _take_bag),

@@ -6,7 +6,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from crash_msgs.msg import Event, Forces, Misfit, MisfitWindow, Parameters, RankedEffect, Ranking, ReplayState, Residuals
+from crash_msgs.msg import (
+    Event,
+    Forces,
+    Misfit,
+    MisfitWindow,
+    Parameters,
+    RankedEffect,
+    Ranking,
+    ReplayState,
+    Residuals,
+)
 from mcap.reader import make_reader
 from rclpy.serialization import serialize_message
 
@@ -146,7 +156,7 @@ effects:
 """
 }
 EFFECT: Files = {
-    "mine.py": b'''import sys
+    "mine.py": b"""import sys
 import numpy as np
 from crash_estimator.core.effects.base import BodyForce, ElementForce, Shape, StaticFactor
 
@@ -156,7 +166,7 @@ def force(motion, width=0.1):
 FIRST = ElementForce("position_damping", "N*s/m^2", {"width": Shape("m", 0.01, 1.0, (0.1, 0.5))}, force=force)
 SECOND = StaticFactor("hardening", "", factor=lambda rate: np.tanh(rate / 5.0), low=0.0, high=10.0)
 THIRD = BodyForce("push", "N", force=lambda time: np.exp(-time / 0.1), size=100.0)
-'''
+"""
 }
 
 TIME_ZERO = time_zero_ns(RECORDING)

@@ -88,7 +88,9 @@ class DiagnosisNode(Node):
         self.complaints = Complaints(lambda line: self.get_logger().error(line))
         self.telling = Telling(self, self.structure)
         self.worker = Worker(self.structure, effects, self.bags)
-        self.also_add = {name: self.create_client(AddEffect, f"{name}/add_effect") for name in names_in(asked["estimators"])}
+        self.also_add = {
+            name: self.create_client(AddEffect, f"{name}/add_effect") for name in names_in(asked["estimators"])
+        }
         self.create_service(AddEffect, "~/add_effect", self._on_add_effect)
         self.create_service(RemoveEffect, "~/remove_effect", self._on_remove_effect)
         self.attending = Attending(self, "diagnosis", self._progress)

@@ -2,7 +2,6 @@
 out, and what the replay has sent while this node was stopped is asked for though nothing comes after it."""
 
 from collections import deque
-from collections.abc import Callable
 from typing import Protocol
 
 from crash_msgs.msg import Samples

@@ -94,7 +94,9 @@ def what_is_wrong(message: Samples | Received, kept: Kept, total: int) -> str:
         return "their times do not increase"
     first, last = time_ns.item(0), time_ns.item(-1)
     if not -TIME_NS <= first <= last <= TIME_NS:
-        return f"their times go from {first * 1e-9:g} to {last * 1e-9:g} s, to be within {TIME.highest:g} s of the impact"
+        return (
+            f"their times go from {first * 1e-9:g} to {last * 1e-9:g} s, to be within {TIME.highest:g} s of the impact"
+        )
     if not np.fmax.reduce(np.abs(message.values), initial=0.0) <= VALUE.highest:
         return f"a value is beyond {VALUE.highest:g}"
     if not kept.agrees(message.number, time_ns):

@@ -23,12 +23,11 @@ from crash_replay.health import HealthReport
 from crash_replay.node_parameters import NAME, Allowed, declare_parameters, names_in
 from crash_replay.output import check_outputs
 from crash_replay.qos import LATCHED, SAID, STREAM, UNACKNOWLEDGED
-from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import decoded, test_from_msg
 from crash_replay.ros_runtime import run
 from crash_replay.said import say
 
-from ..core.structure import ModelError, Structure
+from ..core.structure import Structure
 from ..model_file import load_model, ready_models
 from ..viewer.native import has_display, open_viewer
 from ..viewer.recorder import Recorder
@@ -50,7 +49,9 @@ PARAMETERS = {
     "port": Allowed(9876, "of the gRPC server on 127.0.0.1 that viewers connect to; 0: a free one", 0, 65_535),
     "rrd": Allowed("crash.rrd", "file that the recording is written to; empty: none"),
     "memory_limit": Allowed(
-        "1GiB", "what the server keeps for viewers that come late, such as 500MB or 10%", pattern=r"\d{1,6}(%|[kMGT]i?B|B)"
+        "1GiB",
+        "what the server keeps for viewers that come late, such as 500MB or 10%",
+        pattern=r"\d{1,6}(%|[kMGT]i?B|B)",
     ),
     "open": Allowed(True, "open the native viewer where there is a display"),
     "exit_when_finished": Allowed(False, "end with the replay"),

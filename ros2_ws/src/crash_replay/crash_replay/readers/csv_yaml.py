@@ -120,7 +120,9 @@ def _check_header(path: Path, columns: Sequence[str]) -> None:
         raise RecordingError(f"{path}:1: {wrong}")
     doubled = [name for name, count in Counter(columns).items() if count > 1]
     if doubled:
-        raise RecordingError(f"{path}:1: column {limits.shown(doubled[0])} appears more than once: rename or remove one")
+        raise RecordingError(
+            f"{path}:1: column {limits.shown(doubled[0])} appears more than once: rename or remove one"
+        )
 
 
 def _numbers(path: Path, line: int, columns: Sequence[str], cells: Sequence[str]) -> list[float]:

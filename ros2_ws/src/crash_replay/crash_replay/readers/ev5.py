@@ -93,7 +93,9 @@ def read_header(path: Path) -> Header:
         configuration=test[8],
         closing_speed=_number(path, line, "closing speed", test[14], SPEED),
         masses={
-            int(_number(path, n, "vehicle", f[0], NUMERIC["vehicle"][1])): _number(path, n, "test mass", f[10], TEST_MASS)
+            int(_number(path, n, "vehicle", f[0], NUMERIC["vehicle"][1])): _number(
+                path, n, "test mass", f[10], TEST_MASS
+            )
             for n, f in sections.get("VEHICLE", [])
             if len(f) > 10
         },

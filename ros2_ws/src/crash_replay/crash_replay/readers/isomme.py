@@ -40,9 +40,7 @@ class MmeFile(NamedTuple):
         try:
             number = float(self.get(key))
         except ValueError:
-            raise RecordingError(
-                f"{key!r}: expected a number, found {limits.shown(self.header.get(key))}"
-            ) from None
+            raise RecordingError(f"{key!r}: expected a number, found {limits.shown(self.header.get(key))}") from None
         if wrong := limit.wrong(number):
             raise RecordingError(f"{key!r} {wrong}")
         return number
@@ -126,7 +124,9 @@ def _read_file(file: Path) -> MmeFile:
             try:
                 values.append(float(line))
             except ValueError:
-                raise RecordingError(f"{file}:{number}: expected a number, found {limits.shown(line.strip())}") from None
+                raise RecordingError(
+                    f"{file}:{number}: expected a number, found {limits.shown(line.strip())}"
+                ) from None
     return MmeFile(file, header, np.array(values))
 
 

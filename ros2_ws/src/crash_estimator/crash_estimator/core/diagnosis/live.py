@@ -97,9 +97,7 @@ def _clock(budget: float) -> Callable[[], bool]:
     return lambda: process_time() - begun > budget
 
 
-def _model(
-    state: LiveState, records: Sequence[Record], scales: Scales, additions: Sequence[Addition]
-) -> Model | None:
+def _model(state: LiveState, records: Sequence[Record], scales: Scales, additions: Sequence[Addition]) -> Model | None:
     """It goes on from its last fit; at first, and where it ended nowhere, from the measured motion."""
     layout = make_layout(scales.structure, records, scales, additions)
     start = carried_on(state.model, state.records, layout, records) if state.model else None

@@ -31,7 +31,11 @@ def _said(verdict, steps, ranking, first: Model, final: Model, floor: float, dri
     size = f"residual RMS {first.left.rms / G:.3g} -> {final.left.rms / G:.3g} g, noise floor {floor / G:.3g}"
     if verdict == "adequate":
         left = f"residual RMS {final.left.rms / G:.3g} g, noise floor {floor / G:.3g}"
-        until = "" if _unloads(final) else "; the recording ends before anything unloads: what would come then is not judged"
+        until = (
+            ""
+            if _unloads(final)
+            else "; the recording ends before anything unloads: what would come then is not judged"
+        )
         return f"adequate: nothing significant is missing ({left}){until}"
     if verdict == "effect_missing":
         advice = ""

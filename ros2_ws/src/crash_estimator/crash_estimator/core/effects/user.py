@@ -60,7 +60,9 @@ def _checked(path: str | Path, effect: Effect) -> Effect:
         return effect
     if not callable(getattr(effect, function)):
         raise ModelError(f"{where}: {function} must be a function, got {shown(getattr(effect, function))}")
-    guarded = replace(effect, **{function: _guarded(f"{path}: {function} of {effect.name!r}", getattr(effect, function))})
+    guarded = replace(
+        effect, **{function: _guarded(f"{path}: {function} of {effect.name!r}", getattr(effect, function))}
+    )
     _try_out(f"{path}: {function} of {effect.name!r}", guarded, function)
     return guarded
 
@@ -97,7 +99,9 @@ def _guarded(where: str, function: Callable) -> Callable:
         wanted = np.shape(argument.crush if isinstance(argument, ElementMotion) else argument)
         if values.shape not in ((), wanted):
             instants = wanted[0] if wanted else 1
-            raise ModelError(f"{where} must give one number for each of the {instants} instants, it gives {values.shape}")
+            raise ModelError(
+                f"{where} must give one number for each of the {instants} instants, it gives {values.shape}"
+            )
         return np.broadcast_to(values, wanted) if values.shape != wanted else values
 
     return guarded
