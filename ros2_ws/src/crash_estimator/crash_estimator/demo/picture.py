@@ -7,6 +7,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from .children import Child
+
 LIMIT = 240.0
 """s for one try, on a slow machine with other work; a few otherwise."""
 TRIES = 2
@@ -31,18 +33,15 @@ class Picture:
         self.png.unlink(missing_ok=True)
         command = [sys.executable, "-m", "crash_estimator.viewer.screenshot", str(self.rrd), str(self.png)]
         command += ["--patience", f"{self.limit / 3:g}"]
-        errors = self.rrd.with_name("log") / "picture.log"
-        with errors.open("wb") as log:
-            process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
-            try:
-                status = self._ended(process)
-            finally:
-                _kill_group(process)
+        child = Child("picture", command, self.rrd.with_name("log") / "picture.log", os.environ)
+        try:
+            status = self._ended(child.process)
+        finally:
+            _kill_group(child.process)
         if status is None:
             return f"not drawn within {self.limit:g} s"
         if status:
-            said = errors.read_text(encoding="utf-8", errors="replace").splitlines()
-            return said[-1].removeprefix("error: ") if said else f"drawing it ended with status {status}"
+            return child.last_line().removeprefix("error: ") or f"drawing it ended with status {status}"
         return "" if self.png.is_file() and self.png.stat().st_size else f"{self.png} is empty"
 
     def _ended(self, process: subprocess.Popen) -> int | None:
