@@ -68,7 +68,7 @@ class Demo:
         return self.said().rstrip().splitlines()[-1]
 
     def ended_complete(self, patience: float = PATIENCE) -> bool:
-        """Whether it ends with all there is to have: on a machine without what it takes to draw, all but the picture."""
+        """Whether it ends with all there is to have: where nothing can be drawn, all but the picture."""
         status, last = self.end(patience), self.last_line()
         if last.startswith("incomplete: no picture: ") and "apt install" in last and "; " not in last:
             return status == 1

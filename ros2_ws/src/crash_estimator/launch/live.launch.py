@@ -31,7 +31,7 @@ ARGUMENTS = {  # name: (default or None, meaning)
     "diagnosis": ("false", "say which physical effect the model lacks (true: it is published as the samples come)"),
     "viewer": ("true", "show it in Rerun (false: estimate only)"),
     "rrd": ("crash.rrd", "file that the viewer writes"),
-    "exit_when_finished": ("false", "end when replay, viewer and record have ended; one of them hears the diagnosis out"),
+    "exit_when_finished": ("false", "end with replay, viewer and record; viewer or record hear the diagnosis out"),
 }
 ON = ("true", "1")
 

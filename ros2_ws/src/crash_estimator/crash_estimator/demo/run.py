@@ -80,7 +80,8 @@ class Run:
         if in_time and watch.waiting and not company.lost:
             self.incomplete.append(f"replay has ended before its first sample: {self.children['replay'].last_words()}")
         if not in_time:
-            who = ", ".join(f"{name} ({how})" for name, how in waits_for().items()) or f"replay ({company.how('replay')})"
+            late = waits_for() or {"replay": company.how("replay")}
+            who = ", ".join(f"{name} ({how})" for name, how in late.items())
             logs = next(iter(self.children.values())).log.parent
             self.incomplete.append(f"not ready after {STARTING:g} s: {who}; what they say is in {near(logs)}")
         return not watch.waiting and not self.incomplete
@@ -144,7 +145,8 @@ class Run:
         def left() -> tuple[str, ...]:
             return tuple(name for name in same if not self.listening.revisions[name] and self.company.there(name))
 
-        if not self._wait(lambda: not left(), self.terminal.waiting_for("estimating all samples again"), ESTIMATING, left):
+        waiting = self.terminal.waiting_for("estimating all samples again")
+        if not self._wait(lambda: not left(), waiting, ESTIMATING, left):
             self.incomplete.append(f"what was found was not added to {', '.join(left())}")
 
     def _tables(self) -> None:
@@ -153,8 +155,9 @@ class Run:
             self.terminal.say(f"replay {replay.last_line()}")
         for name, choice in self.choices.items():
             has = self.watch.has(name)
+            lost = self.watch.total - has
             self.terminal.say(
-                f"\n{name}: model {choice.model}, method {choice.method}, {has} samples, {self.watch.total - has} lost\n"
+                f"\n{name}: model {choice.model}, method {choice.method}, {has} samples, {lost} lost\n"
             )
             found = self.watch.said[name].found()
             errors = equation_errors(*found) if found else []

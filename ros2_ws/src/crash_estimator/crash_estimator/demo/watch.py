@@ -1,4 +1,4 @@
-"""What the demonstration sees of the graph: how far the replay is, and all that the estimators and the diagnosis say."""
+"""What the demonstration sees of the graph: how far the replay is, and what estimators and diagnosis say."""
 
 import time
 from collections.abc import Sequence
