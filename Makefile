@@ -4,6 +4,7 @@ help: # what there is to make
 	@sed -n 's/^\([a-z-]*\):.*# /make \1	/p' Makefile
 
 demo: # a crash replayed, what its model lacks named, added and shown in Rerun; of your own with RECORDING=path, WITH=path, MODEL=file
+	@[ -n "$$DISPLAY$$WAYLAND_DISPLAY" ] || { tools/setup && tools/screenshot-libs; }
 	@tools/run crash_estimator demo $(if $(RECORDING),--recording "$(RECORDING)") $(if $(WITH),--with "$(WITH)") $(if $(MODEL),--model "$(MODEL)")
 
 # Without autoload: the plugins of an installed ROS 2 are written for an older pytest.

@@ -15,6 +15,8 @@ from helpers_domain import own_domain
 
 ROOT = Path(__file__).resolve().parent.parent
 BAG = ROOT / "bags/frontal_engine_cab.mcap"
+PATIENCE = 240.0
+"""s for a whole demonstration, on a machine with other work."""
 TEST = "PYTEST_CURRENT_TEST"
 """pytest's environment variable, which whatever a test starts inherits."""
 
@@ -57,10 +59,27 @@ class Demo:
     def wait_for_samples(self) -> None:
         self.wait_until(lambda: " samples  " in self.said(), "the first sample is shown")
 
-    def end(self, patience: float = 60.0) -> int:
+    def end(self, patience: float = PATIENCE) -> int:
         """Exit status, once it has ended by itself."""
         self.children |= set(children_of(self.process.pid))
         return self.process.wait(patience)
+
+    def last_line(self) -> str:
+        return self.said().rstrip().splitlines()[-1]
+
+    def ended_complete(self, patience: float = PATIENCE) -> bool:
+        """Whether it ends with all there is to have: where nothing can be drawn, all but the picture."""
+        status, last = self.end(patience), self.last_line()
+        if last.startswith("incomplete: no picture: ") and "apt install" in last and "; " not in last:
+            return status == 1
+        return status == 0 and "incomplete" not in self.said()
+
+    def stop(self, part: str, seconds: float) -> None:
+        """Let a child stand still."""
+        pid = self.child(part)
+        os.kill(pid, signal.SIGSTOP)
+        time.sleep(seconds)
+        os.kill(pid, signal.SIGCONT)
 
     def child(self, part: str) -> int:
         """Process id of the one child that has `part` in its command line."""

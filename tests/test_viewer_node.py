@@ -30,6 +30,7 @@ from crash_replay.recording import RecordingError
 NAMES = ("mrls", "ckf")
 SAMPLES = 240
 """Enough for every view; each comes in three messages of each estimator and takes some 2 ms to be drawn."""
+FINISHED = msg.ReplayState(state=msg.ReplayState.FINISHED, number=SAMPLES, total=SAMPLES)
 TOPIC_OF = {ParameterBlock: "parameters", ResidualBlock: "residuals", ForceBlock: "forces"}
 
 
@@ -116,13 +117,13 @@ def start(rrd: Path | str, **parameters: str) -> subprocess.Popen:
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
 
 
-def end(viewer: subprocess.Popen, timeout: float) -> tuple[str, str]:
+def end(viewer: subprocess.Popen, timeout: float, status: int = 0) -> tuple[str, str]:
     try:
         output, errors = viewer.communicate(timeout=timeout)
     except subprocess.TimeoutExpired:
         viewer.kill()
         pytest.fail(f"the viewer has not ended within {timeout:g} s, saying:\n{''.join(viewer.communicate())}")
-    assert viewer.returncode == 0, errors
+    assert viewer.returncode == status, errors
     assert "Traceback" not in errors
     return output, errors
 
@@ -166,7 +167,7 @@ def test_it_finds_the_estimators_and_ends_with_the_replay(stage, crash, streams,
     rrd = tmp_path / "found.rrd"
     viewer = start(rrd, exit_when_finished="true")
     stage.play(crash, streams)
-    stage.state.publish(msg.ReplayState(state=msg.ReplayState.FINISHED))
+    stage.state.publish(FINISHED)
     output, _ = end(viewer, timeout=PATIENCE)
     assert output == f"wrote {rrd}: {whole(*sorted(NAMES))}\n"
 
@@ -178,7 +179,7 @@ def test_a_window_that_cannot_open_is_said_and_disturbs_nothing(stage, crash, st
     viewer = start(rrd, open="true", estimators="[mrls, ckf]", exit_when_finished="true")
     stage.play(crash, streams)
     time.sleep(1.0)
-    stage.state.publish(msg.ReplayState(state=msg.ReplayState.FINISHED))
+    stage.state.publish(FINISHED)
     output, errors = end(viewer, timeout=PATIENCE)
     assert "viewer opened on rerun+http://127.0.0.1:" in errors
     assert "could not run; look at it live with: rerun --connect rerun+http://127.0.0.1:" in errors
@@ -191,6 +192,30 @@ def test_it_ends_at_once_where_nothing_was_played(stage, tmp_path):
     viewer.send_signal(signal.SIGTERM)
     output, _ = end(viewer, timeout=POLITE)
     assert output == ""
+
+
+def test_what_did_not_come_is_said_and_is_the_exit_status(stage, crash, streams, tmp_path):
+    rrd = tmp_path / "hole.rrd"
+    viewer = start(rrd, estimators="[mrls, ckf]", exit_when_finished="true")
+    missed = streams["mrls"][60]
+    half = {name: [block for block in streams[name] if block is not missed] for name in NAMES}
+    half["ckf"] = half["ckf"][: len(half["mrls"])]
+    stage.play(crash, half)
+    stage.state.publish(FINISHED)
+    output, errors = end(viewer, timeout=PATIENCE, status=1)
+    (line,) = [line for line in errors.splitlines() if line.startswith("incomplete: ")]
+    assert "mrls 239 of 240 samples (nobody can give them again)" in line and "ckf 239 of 240 samples" in line
+    assert output.startswith(f"wrote {rrd}: ")
+
+
+def test_a_signal_before_the_end_is_said_to_be_the_reason(stage, crash, streams, tmp_path):
+    viewer = start(tmp_path / "early.rrd", estimators="[mrls, ckf]")
+    stage.play(crash, {name: stream[:90] for name, stream in streams.items()})
+    time.sleep(1.5)
+    viewer.send_signal(signal.SIGTERM)
+    _, errors = end(viewer, timeout=POLITE, status=1)
+    assert errors.splitlines()[-1].startswith("incomplete: mrls 30 of 240 samples")
+    assert errors.splitlines()[-1].endswith("ended before the rest came")
 
 
 def test_a_file_that_cannot_be_written_is_one_line(stage, tmp_path):

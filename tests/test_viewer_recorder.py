@@ -5,12 +5,14 @@ import signal
 import socket
 import subprocess
 import time
+from pathlib import Path
 from threading import Event
 
 import helpers_viewer as crash_data
 import numpy as np
 import pytest
-from helpers_viewer import NAMES, feed, recorder, rows, series, settle, two_streams
+import rerun as rr
+from helpers_viewer import NAMES, column, feed, recorder, rows, series, settle, two_streams
 from helpers_waiting import PATIENCE
 from rerun.chunk import RrdReader
 
@@ -66,15 +68,39 @@ def test_a_full_queue_makes_curves_coarser_and_nobody_waits(crash, tmp_path):
     assert not gone_on, "nobody has waited for it"
     goes_on.set()
     settle(target)
-    lines = target.close()
+    target.close(incomplete="a reason")
     assert target.dropped > 1000
-    assert lines[-1].startswith(f"{target.dropped} messages were left out of the picture")
+    assert target.faults == [
+        f"{target.dropped} messages were left out of the picture: they came faster than it can be drawn"
+    ]
+    assert f"**incomplete:** a reason; {target.dropped} messages" in last_summary(tmp_path / "coarse.rrd")
     for name in NAMES:  # each of them is there to its end
         times, _ = series(tmp_path / "coarse.rrd", f"/signal/cab/model/{name}", "Scalars:scalars")
         assert 50 < len(times) < len(crash.time_ns)
         assert np.diff(times, prepend=crash.time_ns[0], append=crash.time_ns[-1]).max() < 10_000_000  # no hole
     assert rows(tmp_path / "coarse.rrd")["/event/mrls"] == 1
     assert said == []
+
+
+def last_summary(path: Path) -> str:
+    """The table as it stands at the end."""
+    _, texts = column(path, "/summary", "TextDocument:text")
+    return str(texts[-1][0])
+
+
+def test_a_file_that_was_not_written_to_its_end_is_a_fault(crash, streams, tmp_path, monkeypatch):
+    path = tmp_path / "cut.rrd"
+    target = recorder(path)
+    feed(target, crash, streams)
+    disconnect = rr.RecordingStream.disconnect
+
+    def disk_is_full(recording):
+        disconnect(recording)
+        path.write_bytes(path.read_bytes()[:-20])
+
+    monkeypatch.setattr(rr.RecordingStream, "disconnect", disk_is_full)
+    target.close()
+    assert target.faults == [f"{path} was not written to its end: is the disk full?"]
 
 
 def test_what_cannot_be_drawn_is_said_once_and_the_rest_goes_on(crash, streams, tmp_path):
@@ -89,6 +115,7 @@ def test_what_cannot_be_drawn_is_said_once_and_the_rest_goes_on(crash, streams, 
     feed(target, crash, streams)
     target.close()
     assert said == ["the viewer leaves something out: ValueError: cannot reshape array of size 3 into shape (1,2)"]
+    assert target.faults == ["left out: ValueError: cannot reshape array of size 3 into shape (1,2)"]
     assert rows(tmp_path / "bad.rrd")["/signal/cab/measured"] == len(crash.time_ns)
 
 

@@ -33,8 +33,10 @@ from .folder import claim
 from .interrupts import interrupt_on_signals
 from .terminal import Terminal, near
 
-PATIENCE_OF_REPLAY = 600.0
-"""s that the replay waits for its subscribers; the demonstration lets it go on earlier where one has died."""
+START_OF_REPLAY = 3600.0
+"""s that the replay waits for its listeners: the demonstration itself gives up earlier, and says why."""
+END_OF_REPLAY = 150.0
+"""s that it stays for who was stopped: a little longer than the demonstration waits for such a process."""
 
 
 def main() -> int:
@@ -82,7 +84,7 @@ def _rate(text: str) -> float:
 
 
 def demo(arguments: argparse.Namespace) -> int:
-    """Exit status 0, or 1 where the replay, the diagnosis or every estimator died."""
+    """Exit status 0, or 1 where the answer, the recording for Rerun or its picture is missing or not whole."""
     source, searches = arguments.recording or bundled_recording(), not arguments.no_diagnosis
     cfc = 0 if searches and arguments.cfc is None else arguments.cfc  # a filter would hide what the sensors' noise is
     with claim(arguments.out, source) as out:
@@ -133,9 +135,10 @@ def _start(
     """All at once; the one that takes longest to start first."""
     names = [choice.name for choice in choices]
     if rrd is not None:
-        rrd.unlink(missing_ok=True)  # an older one must not pass for this one
+        for old in (rrd, rrd.with_suffix(".png")):
+            old.unlink(missing_ok=True)  # an older one must not pass for this one
         models = list(dict.fromkeys(choice.model for choice in choices if choice.model.endswith((".yaml", ".yml"))))
-        viewer = dict(estimators=names, models=models or [""], rrd=str(rrd.absolute()), exit_when_finished=not searches)
+        viewer = dict(estimators=names, models=models or [""], rrd=str(rrd.absolute()))
         children.start("viewer", "crash_estimator", "viewer", **viewer)
     if searches:
         same = [choice.name for choice in choices if choice.model == choices[0].model]
@@ -144,8 +147,8 @@ def _start(
     for choice in choices:
         parameters = dict(model=choice.model, method=choice.method)
         children.start(choice.name, "crash_estimator", "estimator", node=choice.name, **parameters)
-    listeners = len(names) + searches + (rrd is not None) + 1  # estimators, diagnosis, viewer and this process
-    waiting = dict(wait_for=listeners, wait_timeout=PATIENCE_OF_REPLAY)
+    listeners = [*children.all, "demo"]
+    waiting = dict(listeners=listeners, wait_timeout=START_OF_REPLAY, finish_timeout=END_OF_REPLAY)
     children.start("replay", "crash_replay", "replay", bag=str(bag), rate=rate, **waiting)
 
 

@@ -2,40 +2,35 @@
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from pathlib import Path
-
-import rclpy
-from rclpy.executors import Executor
-from rclpy.experimental.events_executor import EventsExecutor
-from rclpy.signals import SignalHandlerOptions
-
-from crash_replay.fault import Fault
-from crash_replay.middleware import prepare_middleware
 
 from ..core.errors import equation_errors
 from ..tables import error_table, parameter_table
-from ..viewer.findings import RankingBlock
 from ..viewer.native import has_display
-from .children import Child, Children
+from .children import Children
 from .choice import Choice
-from .interrupts import held_back
+from .listening import Listening
+from .picture import Picture
 from .story import Story
 from .terminal import Terminal, near
-from .watch import Watch
 
-PERIOD = 0.05
-"""s between two looks at the processes."""
+# How long is waited though nothing gets further, in s; who is stopped or silent is given up by `company`.
+STARTING = 600.0
+"""For all to be ready: what is not compiled yet takes minutes on a slow machine with other work."""
+STANDING_STILL = 400.0
+"""For the next sample or estimate; longer than a replay waits for listeners of which we know nothing."""
+ANSWERING = 1800.0
+"""For the diagnosis, which works and says so, to judge all samples, and again with what it has added."""
 LATE = 10.0
-"""s that estimators which are ready wait for the viewer."""
-SILENCE = 3.0
-"""s without a message after which nothing more is expected of a replay that has ended."""
-WRITING = 20.0
-"""s that the viewer has to finish its file."""
-ANSWERING = 240.0
-"""s that the diagnosis has for its answer after the last sample, and again with what it has added."""
-ESTIMATING = 20.0
-"""s that an estimator then has to estimate all samples again."""
+"""For an answer that the diagnosis says it has given."""
+ESTIMATING = 120.0
+"""For the estimators to estimate all samples again with what was added."""
+DRAWING = 600.0
+"""For the viewer to draw what waits."""
+CLOSING = 90.0
+"""For the viewer to finish its file."""
+
 MISSING = ("Missing effect", "which effect the model lacks, and its error, fit by fit; shaded where the model fails")
 LOOK_AT = (
     ("Overview", "measured and predicted acceleration; the residual leaves its 99 % band where a model fails"),
@@ -52,140 +47,119 @@ class Run:
         self.children, self.terminal, self.rrd = children.all, terminal, rrd
         self.choices = {choice.name: choice for choice in choices}
         self.story = Story() if "diagnosis" in self.children else None
-        self.dead: set[str] = set()  # those that ended though they should not have
-        self.changed = False  # an estimator's model
-        self.gave_up = False  # the diagnosis: it says why, and nothing more
-        self.ended_at = 0.0  # when the replay had ended and something came for the last time
-        self.heard = 0
-        self.ready_at = 0.0  # s after the start, when all estimators were there
-        self.resumed = False
 
     def to_the_end(self) -> int:
-        """Exit status 0, or 1 where the replay, the diagnosis or every estimator died."""
-        prepare_middleware()
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        watch, executor = Watch(list(self.choices), ["diagnosis"] if self.story else []), EventsExecutor()
-        executor.add_node(watch)
-        try:
-            self._follow(watch, executor)
-            if self.story:
-                self._wait_for_answer(watch, executor)
-            else:
-                self._tables(watch)
-            self._wait_for_viewer()
-        finally:
-            self.terminal.clear()
-            executor.shutdown()  # before the node: it still holds the node's events, and lets go of them last
-            watch.destroy_node()
-            rclpy.shutdown()
-        return 1 if self.dead & {"replay", "diagnosis"} or self.gave_up or not self._alive() else 0
+        """Exit status 0, or 1 where something is missing: the last line then says what."""
+        with Listening(self.children, list(self.choices), self.terminal, self.story) as self.listening:
+            self.watch, self.company = self.listening.watch, self.listening.company
+            self.incomplete, self._wait = self.listening.incomplete, self.listening.wait
+            if self._start():
+                self._follow()
+                if self.story:
+                    self._wait_for_answer()
+                else:
+                    self._tables()
+                self._wait_for_viewer()
+        return self._conclude()
 
-    def _alive(self) -> list[str]:
-        return [name for name in self.choices if name not in self.dead]
+    def _start(self) -> bool:
+        """Wait until the replay has begun: it does when all have said that they are ready."""
+        company, watch = self.company, self.watch
 
-    def _needed(self) -> list[str]:
-        """Nodes that live and that the replay does not begin without."""
-        return self._alive() + ["diagnosis"] * (self.story is not None and "diagnosis" not in self.dead)
+        def waits_for() -> dict[str, str]:
+            found = {name: company.how(name) for name in self.children if name != "replay"}
+            return {name: how for name, how in found.items() if how != "ready"}
 
-    def _follow(self, watch: Watch, executor: Executor) -> None:
-        began, encoding = time.monotonic(), self.terminal.stream.encoding
-        while not self._is_over(watch):
-            self._listen(watch, executor)
-            if watch.waiting:
-                waited = time.monotonic() - began
-                self.terminal.wait(self._start(watch, waited), waited)
-            else:
-                self.terminal.progress(watch.progress(encoding))
-        self.terminal.end_progress(watch.progress(encoding, watch.total))
+        def tell(waited: float) -> None:
+            named = ", ".join(f"{name} ({how})" for name, how in waits_for().items())
+            hint = "; after an update they compile their code first" if waited > 5.0 and named else ""
+            self.terminal.wait(f"waiting for {named or 'the first sample'}{hint}", waited)
 
-    def _listen(self, watch: Watch, executor: Executor) -> None:
-        until = time.monotonic() + PERIOD
-        with held_back():
-            while (left := until - time.monotonic()) > 0:
-                executor.spin_once(timeout_sec=left)
-        self._tell_of_processes()
-        for finding in watch.new_findings() if self.story else ():
-            tell = self.story.ranking if isinstance(finding, RankingBlock) else self.story.misfit
-            for line in tell(finding):
-                self.terminal.say(line)
+        over = lambda: not watch.waiting or bool(company.lost) or not company.there("replay")  # noqa: E731
+        in_time = self._wait(over, tell, STARTING, lambda: tuple(waits_for().items()))
+        if in_time and watch.waiting and not company.lost:
+            self.incomplete.append(f"replay has ended before its first sample: {self.children['replay'].last_words()}")
+        if not in_time:
+            late = waits_for() or {"replay": company.how("replay")}
+            who = ", ".join(f"{name} ({how})" for name, how in late.items())
+            logs = next(iter(self.children.values())).log.parent
+            self.incomplete.append(f"not ready after {STARTING:g} s: {who}; what they say is in {near(logs)}")
+        return not watch.waiting and not self.incomplete
 
-    def _wait_for_answer(self, watch: Watch, executor: Executor) -> None:
-        """Until the diagnosis has judged all samples, and the model with what it has added."""
-        began, answers = time.monotonic(), 0
-        while not (self.story.complete or self.gave_up or "diagnosis" in self.dead):
-            if len(self.story.finals) > answers:
-                began, answers = time.monotonic(), len(self.story.finals)
-            waited = time.monotonic() - began
-            if waited > ANSWERING:
-                self.terminal.say(f"the diagnosis has not answered within {ANSWERING:g} s")
-                return
-            self._listen(watch, executor)
-            doing = "judging the model with it" if answers else "comparing every candidate on all samples"
+    def _follow(self) -> None:
+        """Until the replay has ended, and all that the estimators have to say has come."""
+        watch, company, encoding = self.watch, self.company, self.terminal.stream.encoding
+
+        def over() -> bool:
+            told = all(watch.settled(name) or not company.there(name) for name in self.choices)
+            return not company.there("replay") and (told or not watch.finished)
+
+        def progress() -> Hashable:
+            has = tuple(watch.has(name) for name in self.choices)
+            return watch.run, watch.state.number, has, watch.lost(), time.monotonic() if watch.paused else 0.0
+
+        if not self._wait(over, lambda _: self.terminal.progress(watch.progress(encoding)), STANDING_STILL, progress):
+            behind = [name for name in self.choices if not watch.settled(name)]
+            who = ", ".join(["replay"] * company.there("replay") + behind)
+            self.incomplete.append(f"nothing has come for {STANDING_STILL:g} s of {who}: start again")
+        self.terminal.end_progress(watch.progress(encoding))
+        for name in self.choices:
+            if lacks := watch.lacks(name):
+                self.incomplete.append(f"{name} has {lacks}")
+
+    def _wait_for_answer(self) -> None:
+        """Until the diagnosis has said its last word: on all samples, and on the model with what it has added."""
+        story, company, watch = self.story, self.company, self.watch
+
+        def done() -> bool:
+            word = company.word("diagnosis")
+            return word is not None and word.done and (word.run == watch.run or bool(word.reason))
+
+        def tell(waited: float) -> None:
+            doing = "judging the model with it" if story.finals else "comparing every candidate on all samples"
             self.terminal.wait(doing, waited)
-        self.terminal.clear()
-        deadline = time.monotonic() + (ESTIMATING if self.story.added else 3 * PERIOD)  # and its last curves
-        while time.monotonic() < deadline and not (self.story.added and self.changed):
-            self._listen(watch, executor)
 
-    def _is_over(self, watch: Watch) -> bool:
-        if not self._alive():
-            return True
-        if self.children["replay"].status is None:
-            return False
-        newest = [watch.samples.next, *(watch.followed[name].samples for name in self._alive())]
-        if watch.total and min(newest) >= watch.total:
-            return True
-        now = time.monotonic()
-        if watch.heard != self.heard or not self.ended_at:
-            self.heard, self.ended_at = watch.heard, now
-        return now - self.ended_at > SILENCE
+        def progress() -> Hashable:
+            return len(story.finals)
 
-    def _tell_of_processes(self) -> None:
-        """Warnings of all, what the viewer says of itself, what is added to a model, and who has died."""
-        for name, child in self.children.items():
-            for level, text in child.messages():
-                changed = name in self.choices and text.startswith("revision ")  # an effect has been added to its model
-                self.changed |= changed
-                if level in ("WARN", "ERROR", "FATAL") or name == "viewer" or changed:
-                    self.terminal.say(f"{'added to ' * changed}{name}: {text}")
-                self.gave_up |= name == "diagnosis" and level in ("ERROR", "FATAL")
-            status = child.status
-            stays = name in self.choices or name == "diagnosis"
-            early = bool(status) or (stays and self.children["replay"].status is None)
-            if status is not None and early and name not in self.dead:
-                self.dead.add(name)
-                self.terminal.say(f"{name} has ended too early: {child.last_words()}")
+        gone = lambda: not (company.there("diagnosis") and watch.finished)  # noqa: E731
+        in_time = self._wait(lambda: done() or gone(), tell, ANSWERING, progress)
+        if done():
+            self._wait(lambda: story.complete or gone(), tell, LATE, progress)
+        if story.complete:
+            return self._wait_for_addition() if story.added else None
+        word = company.word("diagnosis")
+        if not in_time:
+            why = f"at work for {ANSWERING:g} s without one; start again when the machine has less to do"
+        elif not watch.finished:
+            why = "the replay did not get to its last sample"
+        else:
+            why = company.lost.get("diagnosis") or (word and word.reason) or "it has not come"
+        self.incomplete.append(f"no answer of the diagnosis ({why})")
 
-    def _start(self, watch: Watch, waited: float) -> str:
-        """Join in as the last, see to it that the replay begins; a line on what it waits for."""
-        alive = self._needed()
-        absent = watch.absent(alive)
-        if absent:
-            hint = ": after an update they compile their code first, half a minute" if waited > 5.0 else ""
-            return f"waiting for {', '.join(absent)}{hint}"
-        self.ready_at = self.ready_at or waited
-        late = waited - self.ready_at > (LATE if not self.dead else 2.0)
-        viewer = "viewer" in self.children and "viewer" not in self.dead
-        if viewer and watch.counted <= len(alive) and not watch.subscribed and not late:
-            return "waiting for the viewer"
-        watch.be_counted()
-        if (self.dead or late) and watch.counted > len(alive) and not self.resumed:
-            self.terminal.say(f"beginning without {', '.join(sorted(self.dead)) or 'the viewer'}")
-            watch.resume()
-            self.resumed = True
-        return "waiting for the first sample"
+    def _wait_for_addition(self) -> None:
+        """Until the estimators of the model have estimated all samples again with what was added."""
+        model = next(iter(self.choices.values())).model
+        same = [name for name, choice in self.choices.items() if choice.model == model]
 
-    def _tables(self, watch: Watch) -> None:
+        def left() -> tuple[str, ...]:
+            return tuple(name for name in same if not self.listening.revisions[name] and self.company.there(name))
+
+        waiting = self.terminal.waiting_for("estimating all samples again")
+        if not self._wait(lambda: not left(), waiting, ESTIMATING, left):
+            self.incomplete.append(f"what was found was not added to {', '.join(left())}")
+
+    def _tables(self) -> None:
         replay = self.children["replay"]
         if replay.status == 0:
             self.terminal.say(f"replay {replay.last_line()}")
         for name, choice in self.choices.items():
-            followed = watch.followed[name]
-            lost = followed.lost(watch.total)
+            has = self.watch.has(name)
+            lost = self.watch.total - has
             self.terminal.say(
-                f"\n{name}: model {choice.model}, method {choice.method}, {followed.samples} samples, {lost} lost\n"
+                f"\n{name}: model {choice.model}, method {choice.method}, {has} samples, {lost} lost\n"
             )
-            found = followed.found()
+            found = self.watch.said[name].found()
             errors = equation_errors(*found) if found else []
             if any(error.samples for error in errors):
                 self.terminal.say(f"{parameter_table(*found)}\n\n{error_table(errors)}")
@@ -193,38 +167,54 @@ class Run:
                 self.terminal.say("nothing of the impact was estimated")
 
     def _wait_for_viewer(self) -> None:
-        viewer: Child | None = self.children.get("viewer")
-        if viewer is None:
+        """Until it has drawn all and finished its file; it would wait for more then."""
+        company = self.company
+        if "viewer" not in self.children:
             return
         self.terminal.say()
-        if self.story and viewer.status is None:
-            viewer.process.terminate()  # it would wait for more
-        deadline = time.monotonic() + WRITING
-        while viewer.status is None and time.monotonic() < deadline:
-            time.sleep(PERIOD)
-        self._tell_of_processes()
+        viewer = self.children["viewer"]
+
+        def drawn() -> bool:
+            word = company.word("viewer")
+            return not company.there("viewer") or (word is not None and word.done)
+
+        waiting = self.terminal.waiting_for(f"writing {near(self.rrd)}")
+        if not self._wait(drawn, waiting, DRAWING, lambda: None):
+            self.incomplete.append(f"the viewer has not drawn all within {DRAWING:g} s")
+        company.let_go.add("viewer")
+        if viewer.status is None and "viewer" not in company.lost:
+            viewer.process.terminate()
+            self._wait(lambda: viewer.status is not None, waiting, CLOSING, lambda: None)
         if viewer.status is None:
-            self.terminal.say(f"viewer: has not finished {self.rrd} within {WRITING:g} s, it is ended now")
-            return
-        if viewer.status == 0:
-            self.terminal.say(f"viewer {viewer.last_line()}")
-            rerun = Path(sys.prefix) / "bin" / "rerun"
-            again = f"{near(rerun)} {near(self.rrd)}"
-            if self.story and not has_display():
-                self._picture()
-            window = "The viewer stays open; look at it again later" if has_display() else "Look at it"
-            self.terminal.say(f"\n{window} with: {again}\n\nWhat to look at, by tab:")
-            for tab, what in ([MISSING] if self.story else []) + list(LOOK_AT):
-                self.terminal.say(f"  {tab:18} {what}")
+            self.incomplete.append(f"no whole {near(self.rrd)} (the viewer has not finished it)")
+        elif viewer.status and "viewer" not in company.lost:
+            self.incomplete.append(f"no whole {near(self.rrd)} ({viewer.last_words()})")
+        elif viewer.status == 0:
+            self._say_where_to_look()
 
-    def _picture(self) -> None:
-        """What a viewer would show at the end, where there is no screen for it."""
-        from ..viewer.screenshot import screenshot  # takes Rerun, which all else here does without
+    def _say_where_to_look(self) -> None:
+        self.terminal.say(f"viewer {self.children['viewer'].last_line()}")
+        if not has_display():
+            self._draw_picture()
+        rerun = Path(sys.prefix) / "bin" / "rerun"
+        window = "The viewer stays open; look at it again later" if has_display() else "Look at it"
+        self.terminal.say(f"\n{window} with: {near(rerun)} {near(self.rrd)}\n\nWhat to look at, by tab:")
+        for tab, what in ([MISSING] if self.story else []) + list(LOOK_AT):
+            self.terminal.say(f"  {tab:18} {what}")
 
-        picture = self.rrd.with_suffix(".png")
-        try:
-            screenshot(self.rrd, picture)
-        except Fault as error:
-            self.terminal.say(f"no picture of it: {error}")
+    def _draw_picture(self) -> None:
+        picture = Picture(self.rrd, self.terminal.waiting_for("drawing its picture"))
+        why = picture.draw()
+        self.terminal.clear()
+        if why:
+            self.incomplete.append(f"no picture: {why}")
         else:
-            self.terminal.say(f"its picture: {near(picture.absolute())}")
+            self.terminal.say(f"its picture: {near(picture.png.absolute())}")
+
+    def _conclude(self) -> int:
+        replay = self.children["replay"]
+        if replay.status and not self.incomplete:  # it knows of somebody whom we do not
+            self.incomplete.append(f"replay: {replay.last_words()}")
+        if self.incomplete:
+            self.terminal.say(f"incomplete: {'; '.join(self.incomplete)}")
+        return 1 if self.incomplete else 0

@@ -3,6 +3,7 @@
 import shutil
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
@@ -45,6 +46,10 @@ class Terminal:
         elif what != self.waiting:
             self._show(what)
         self.waiting = what
+
+    def waiting_for(self, what: str) -> Callable[[float], None]:
+        """Tells it when it is called with the s for which it is waited."""
+        return lambda seconds: self.wait(what, seconds)
 
     def _show(self, line: str) -> None:
         line = visible(line)

@@ -1,8 +1,9 @@
 """`viewer`: shows what the estimators say in Rerun, live, and writes it to a .rrd file.
 
-Subscribes to `test`, `replay_state`, each estimator's `parameters`, `residuals`, `forces` and `events`, and the
-diagnosis' `ranking`, `misfit` and `revisions`. Callbacks only queue what comes; decoding, drawing and waiting for a
-slow screen happen in the recorder's own thread.
+Subscribes to `test`, each estimator's `parameters`, `residuals`, `forces` and `events`, and the diagnosis' `ranking`,
+`misfit` and `revisions`. Callbacks only queue what comes; decoding, drawing and waiting for a slow screen happen in the
+recorder's own thread. What it has missed itself it asks the estimators for; what it lacks in the end it says on the
+terminal, in the file and by its exit status.
 """
 
 import os
@@ -12,11 +13,12 @@ import time
 from collections.abc import Callable, Hashable, Sequence
 from functools import cache, partial
 
-from crash_msgs.msg import ReplayState, Samples, TestInfo
+from crash_msgs.msg import Event, Samples, TestInfo
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 
+from crash_replay.attending import Attending, Progress
 from crash_replay.complaints import Complaints
 from crash_replay.foreign_text import visible
 from crash_replay.health import HealthReport
@@ -34,13 +36,15 @@ from ..viewer.recorder import Recorder
 from ..viewer.sinks import Sinks
 from .hearing import hear
 from .node_health import viewer_health
+from .viewer_account import Account
 from .viewer_messages import BLOCK_OF, FINDING_OF, test_block
-
-QUIET = 3.0
-"""s without a message after which a finished replay counts as shown, though samples are missing."""
+from .whole_estimates import WholeEstimates
 
 SETTLED = 0.3
 """s for which all publishers must have been there: they hear of their subscriber a little later than it of them."""
+
+HURRIED, PATIENT = 6.0, 60.0
+"""s to end the file: where a signal has come before the end, whoever sent it may not wait long."""
 
 
 PARAMETERS = {
@@ -66,13 +70,13 @@ class ViewerNode(Node):
         # on, Rerun's too, but not for the middleware's, whose acknowledgements the estimators may wait for.
         os.nice(10)
         log = self.get_logger().info
-        self.estimators, self.exits = names_in(asked["estimators"]), asked["exit_when_finished"]
+        self.names, self.exits = names_in(asked["estimators"]), asked["exit_when_finished"]
         port, wants_window, models = asked["port"], asked["open"], names_in(asked["models"])
         check_outputs({"parameter rrd:": asked["rrd"] or None}, models)
         sinks = Sinks(port, asked["rrd"], asked["memory_limit"])
         known = cache(partial(structure_named, models))
         warn = self.get_logger().warning
-        self.recorder = Recorder(sinks, tuple(self.estimators), say=warn, structure_of=known)
+        self.recorder = Recorder(sinks, tuple(self.names), say=warn, structure_of=known)
         if sinks.port != port:
             log(f"port {port} is in use, taking {sinks.port}")
         self.window: subprocess.Popen | None = None
@@ -85,50 +89,77 @@ class ViewerNode(Node):
         if sinks.rrd:
             log(f"writing {visible(sinks.rrd)}")
         self.done = Future()
-        self.finished = False
+        self.total = 0  # samples of the test
         self.counted: Subscription | None = None
         self.replay_goes_on = False
-        self.followed: set[str] = set()
-        self.inputs: list[Subscription] = []
+        self.said_finished = False
+        self.estimates: dict[str, WholeEstimates] = {}  # by estimator
         self.heard_since = time.monotonic()
+        self.attending = Attending(self, "viewer", self._progress)
+        self.account = Account(self.attending, self.estimates)
         complaints = Complaints(lambda line: self.get_logger().warning(line))
         hear(self, complaints, TestInfo, "test", self._on_test, LATCHED)
-        hear(self, complaints, ReplayState, "replay_state", self._on_state, LATCHED)
         for topic, (kind, make) in FINDING_OF.items():
-            queue = partial(self._queue, kind, make, None)
+            queue = partial(self._on_finding, kind, make)
             self.create_subscription(kind, topic, queue, SAID, raw=True)
-        for name in self.estimators:
+        for name in self.names:
             self._follow(name)
         HealthReport(self, "queue", partial(viewer_health, self.recorder))
         self.create_timer(0.1, self._look_around)
+        self.attending.tell()
 
     def _follow(self, name: str) -> None:
-        self.followed.add(name)
-        for topic, (kind, make) in BLOCK_OF.items():
-            queue = partial(self._queue, kind, partial(make, name), None if topic == "events" else (name, topic))
-            self.inputs.append(self.create_subscription(kind, f"{name}/{topic}", queue, STREAM, raw=True))
+        def queue(topic: str, raw: bytes) -> None:
+            kind, make = BLOCK_OF[topic]
+            self._queue(kind, partial(make, name), None if topic == "events" else (name, topic), raw)
+
+        self.estimates[name] = WholeEstimates(self, name, self.attending, queue)
+        self.create_subscription(Event, f"{name}/events", partial(queue, "events"), STREAM, raw=True)
 
     def _queue(self, kind: type, make: Callable, stream: Hashable, raw: bytes) -> None:
         self.recorder.put(lambda: make(decoded(raw, kind)), stream, len(raw))
 
+    def _on_finding(self, kind: type, make: Callable, raw: bytes) -> None:
+        self.account.hear(kind, raw)
+        self._queue(kind, make, None, raw)
+
     def _on_test(self, message: TestInfo) -> None:
         test_from_msg(message)  # raises where it cannot be a test
+        self.total = message.samples
+        self.account.begin_test(message.samples)
+        for estimates in self.estimates.values():
+            estimates.begin_test()
         self.recorder.put(partial(test_block, message))
 
-    def _on_state(self, message: ReplayState) -> None:
-        self.finished = message.state == ReplayState.FINISHED
+    def _progress(self) -> Progress:
+        """What there is to say on `attendance`: it needs no samples, so that no replay waits for it to get them."""
+        state, ready = self.attending.replay_state, self.replay_goes_on or self.counted is not None
+        if not self.total:
+            return Progress(ready=ready)
+        run, number = (state.run, state.number) if state else (0, 0)
+        reason = self._reason()
+        done = self.account.settled() and self.recorder.saved
+        return Progress(run, self.total, number, self.account.missing(), done, reason, ready)
+
+    def _reason(self) -> str:
+        """What the picture lacks, as far as it is known."""
+        lacking = self.account.lacking() if self.account.settled() else []
+        return "; ".join([*lacking, *self.recorder.faults])
 
     def _look_around(self) -> None:
         """Find estimators, let a waiting replay count this viewer, and end with the replay when asked to."""
-        if not self.estimators:
-            for name in sorted(self._estimators_around() - self.followed):
+        if not self.names:
+            for name in sorted(self._estimators_around() - self.estimates.keys()):
                 self._follow(name)
         self._be_counted()
         if self.window and self.window.poll() is not None:
             self.get_logger().info(f"the viewer was closed or could not run; {self.invitation}")
             self.window = None
-        quiet = time.monotonic() - self.recorder.last_put > QUIET
-        if self.exits and self.finished and self.recorder.idle and (self.recorder.complete or quiet):
+        over = self.account.replay_is_over()
+        if over != self.said_finished:  # the replay ends when it knows that this node has heard of the last sample
+            self.said_finished = over
+            self.attending.tell()
+        if self.exits and over and self.account.settled() and self.recorder.idle:
             self.done.set_result(None)
 
     def _estimators_around(self) -> set[str]:
@@ -146,12 +177,13 @@ class ViewerNode(Node):
             if self.counted:
                 self.destroy_subscription(self.counted)
                 self.counted = None
-        elif self.counted is None and self.inputs:
-            if not all(subscription.get_publisher_count() for subscription in self.inputs):
+        elif self.counted is None and self.estimates:
+            if not all(estimates.found for estimates in self.estimates.values()):
                 self.heard_since = time.monotonic()
             elif time.monotonic() - self.heard_since > SETTLED:
                 begun = self._on_first_sample
                 self.counted = self.create_subscription(Samples, "samples", begun, UNACKNOWLEDGED, raw=True)
+                self.attending.tell()
 
     def _on_first_sample(self, _raw: bytes) -> None:
         self.replay_goes_on = True
@@ -170,10 +202,17 @@ def main() -> int:
     return run(ViewerNode, until=lambda node: node.done, close=close)
 
 
-def close(node: ViewerNode) -> None:
-    """Say where what was shown is kept."""
-    for line in node.recorder.close():
+def close(node: ViewerNode) -> str:
+    """Say where what was shown is kept -> a line on what it lacks, or ""."""
+    whole = node.account.settled() and node.recorder.idle
+    lacking = node.account.lacking() if node.total else []
+    if lacking and not whole:
+        lacking.append("ended before the rest came")
+    for line in node.recorder.close(PATIENT if whole else HURRIED, "; ".join(lacking)):
         say(line)
+    node.attending.leave()
+    lacking += node.recorder.faults
+    return f"incomplete: {'; '.join(lacking)}" if lacking else ""
 
 
 if __name__ == "__main__":

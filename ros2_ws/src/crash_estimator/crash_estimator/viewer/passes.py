@@ -1,5 +1,6 @@
 """One pass over the test: gathers the cast, then lets the show begin."""
 
+import os
 import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -20,6 +21,12 @@ COURTESY = 0.5
 
 FILE_PERIOD = 2.0
 """s of wall clock between batches for the file."""
+
+FLUSHING = 30.0
+"""s that the last of it may take to reach the disk, or a viewer."""
+
+FILE_END = b"RRF2FOOT"
+"""In the last twelve bytes of a .rrd file that was written to its end."""
 
 KINDS = {ParameterBlock, ResidualBlock, ForceBlock}
 """What an estimator says of every sample."""
@@ -101,8 +108,8 @@ class Pass:
         self._saved_at = time.monotonic()
         self.shows[1].write(unsaved)
 
-    def end(self) -> None:
-        """Nothing more comes: draw what waits, write the file's footer."""
+    def end(self, incomplete: str = "") -> None:
+        """Nothing more comes: draw what waits, write the file's footer; incomplete: said in the summary."""
         if self.ended:
             return
         self.ended = True
@@ -112,10 +119,25 @@ class Pass:
         for k in reversed(range(len(self.recordings))):  # the file first, whatever a viewer does
             try:
                 if self.shows:
-                    self.shows[k].finish()
-                self.recordings[k].flush(timeout_sec=2.0)
+                    self.shows[k].finish(incomplete)
+                self.recordings[k].flush(timeout_sec=FLUSHING)
             finally:
                 self.recordings[k].disconnect()
+
+    @property
+    def saved(self) -> bool:
+        """Whether all that was drawn has been handed to the file too."""
+        return not (self.path and self._unsaved)
+
+    def fault_of_file(self) -> str:
+        """What is wrong with the file, once it has ended: Rerun writes it in a thread of its own, and says nothing."""
+        try:
+            with self.path.open("rb") as file:
+                file.seek(-12, os.SEEK_END)
+                whole = file.read().startswith(FILE_END)
+        except OSError:
+            whole = False
+        return "" if whole else f"{self.path} was not written to its end: is the disk full?"
 
     @property
     def complete(self) -> bool:

@@ -4,6 +4,7 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Hashable
+from functools import partial
 from typing import NamedTuple
 
 from crash_replay.scheduling import step_back
@@ -33,6 +34,9 @@ BACK = 10
 """Niceness of the viewer meanwhile."""
 MOST = 2.0 * HOLD
 """Bytes that wait at most while others are drawn; beyond that, curves become coarser."""
+
+MOST_FAULTS = 5
+"""Kinds of what could not be drawn that are listed in the end."""
 
 AT_THE_END = 30_000
 """Items that are written within about two seconds when the end has come."""
@@ -79,6 +83,8 @@ class Recorder:
         self._stride = 1  # every how manyth of them is kept
         self._guard = threading.Lock()
         self._stop = threading.Event()
+        self._incomplete = ""  # what the newest pass lacks, as it ends
+        self._faults_of_files: list[str] = []
         self._busy = False
         self._held = 0  # bytes in the queue
         self._rush, self._stepped_back = Rush(RUSH), False
@@ -87,6 +93,7 @@ class Recorder:
         self._passes: dict[tuple[int, int], Pass] = {}  # by (replay, run), the newest last
         self._spare: Pass | None = self._open()  # its server is up before the first sample
         self._troubles = Complaints(say)
+        self._left_out: dict[str, None] = {}  # what could not be drawn, and why
         self._thread = threading.Thread(target=self._work, name="rerun", daemon=True)
         self._thread.start()
 
@@ -126,7 +133,7 @@ class Recorder:
         """How it stands."""
         with self._guard:
             test = self._test.id if self._test else ""
-            return Queue(len(self._queue), self._held, self.dropped, len(self._troubles), test)
+            return Queue(len(self._queue), self._held, self.dropped, len(self._left_out), test)
 
     @property
     def idle(self) -> bool:
@@ -135,25 +142,42 @@ class Recorder:
             return not self._queue and not self._busy
 
     @property
+    def saved(self) -> bool:
+        """Whether it has been handed to the file too."""
+        return self.idle and all(pass_.saved for pass_ in list(self._passes.values())[-1:])
+
+    @property
     def complete(self) -> bool:
         """Whether the newest pass has been drawn to its last sample."""
         newest = list(self._passes.values())[-1:]
         return bool(newest) and newest[0].complete
 
-    def close(self, timeout: float = 6.0) -> list[str]:
-        """Write what is left, end the files properly, and say in lines what was written; takes `timeout` s at most."""
+    @property
+    def faults(self) -> list[str]:
+        """What was handed over and is not in the picture, and after `close` what is wrong with the files."""
+        lines = [f"left out: {trouble}" for trouble in self._left_out]
+        if self.dropped:
+            lines.append(f"{self.dropped} messages were left out of the picture: they came faster than it can be drawn")
+        return lines + self._faults_of_files
+
+    def close(self, timeout: float = 6.0, incomplete: str = "") -> list[str]:
+        """Write what is left, end the files properly, and say in lines what was written; takes `timeout` s at most.
+
+        incomplete: said in the summary of the newest pass.
+        """
         with self._guard:
             self.limit = min(self.limit, AT_THE_END)
             while len(self._queue) > self.limit and self._stride < AT_THE_END:
                 self._thin()
+        self._incomplete = "; ".join(filter(None, [incomplete, *self.faults]))
         self._stop.set()
         self._thread.join(timeout)
         if self._thread.is_alive():
-            return [f"the recording was not finished within {timeout:g} s: its last samples may be missing"]
-        lines = [pass_.report() for pass_ in self._passes.values() if pass_.path]
-        if self.dropped:
-            lines.append(f"{self.dropped} messages were left out of the picture: they came faster than it can be drawn")
-        return lines
+            self._faults_of_files = [f"not finished within {timeout:g} s: the last samples may be missing"]
+            return []
+        written = [pass_ for pass_ in self._passes.values() if pass_.path]
+        self._faults_of_files = [fault for pass_ in written if (fault := pass_.fault_of_file())]
+        return [pass_.report() for pass_ in written]
 
     def _work(self) -> None:
         pause = PERIOD
@@ -165,8 +189,10 @@ class Recorder:
             if not was_rush or self._stepped_back:  # after a rush what was put off comes at once, and nothing is slowed
                 pause = max(PERIOD, (time.monotonic() - began) * (1 - SHARE) / SHARE)
         self._write_batch()
+        incomplete = self._incomplete
         for pass_ in reversed([*filter(None, [self._spare]), *self._passes.values()]):  # the one with the server last
-            self._guarded(pass_.end)
+            self._guarded(partial(pass_.end, incomplete))
+            incomplete = ""
 
     def _put_off(self) -> bool:
         """Whether so much comes that drawing it can wait: the estimators may need what it would take."""
@@ -225,6 +251,8 @@ class Recorder:
         try:
             return action()
         except Exception as error:  # whatever it is, the thread must live
-            what = type(error).__name__
-            self._troubles.complain(what, f"the viewer leaves something out: {what}: {' '.join(str(error).split())}")
+            trouble = f"{type(error).__name__}: {' '.join(str(error).split())}"
+            if len(self._left_out) < MOST_FAULTS:
+                self._left_out[trouble] = None
+            self._troubles.complain(type(error).__name__, f"the viewer leaves something out: {trouble}")
             return None

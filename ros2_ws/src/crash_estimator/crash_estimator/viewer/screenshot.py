@@ -117,12 +117,13 @@ def _command(argv: list[str] | None) -> None:
     parser.add_argument("png")
     parser.add_argument("--at", type=float, help="time cursor, s since the impact (default: the end)")
     parser.add_argument("--size", default="1600x900", help="WIDTHxHEIGHT in pixels")
+    parser.add_argument("--patience", type=float, default=60.0, help="s for each of three steps (default: 60)")
     arguments = parser.parse_args(argv)
     width, _, height = arguments.size.partition("x")
     if not (width.isdigit() and height.isdigit()):
         parser.error(f"--size must be WIDTHxHEIGHT such as 1600x900, got {arguments.size!r}")
     check_outputs({"PNG": arguments.png}, [arguments.rrd])
-    screenshot(arguments.rrd, arguments.png, arguments.at, (int(width), int(height)))
+    screenshot(arguments.rrd, arguments.png, arguments.at, (int(width), int(height)), arguments.patience)
 
 
 if __name__ == "__main__":

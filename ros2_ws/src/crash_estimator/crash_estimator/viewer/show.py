@@ -80,8 +80,9 @@ class Show:
         self.set_cast(replace(self.cast, judged=tuple(judged)))
         validation.write(self.pen, self.cast, judged)
 
-    def finish(self) -> None:
-        """The last sample has been written."""
+    def finish(self, incomplete: str = "") -> None:
+        """The last sample has been written; incomplete: what is missing all the same."""
         self.motion.finish(self.cast)
         self.missing.finish()
+        self.summary.incomplete = incomplete
         self.summary.write(self.cast)

@@ -24,6 +24,7 @@ class Summary:
         self.errors: dict[Key, np.ndarray] = {}  # [samples, sum of squared residuals, samples inside the band]
         self.parameters: dict[Key, tuple[float, float]] = {}
         self.time_ns = 0
+        self.incomplete = ""  # what the whole recording lacks
 
     def add_residuals(self, block: ResidualBlock) -> None:
         """From the impact on."""
@@ -65,6 +66,7 @@ class Summary:
         lines.append(_group("inside the 99 % band", len(names)))
         for body, _ in cast.equations:
             lines.append(row(body, [self._inside(name, body) for name in names]))
+        lines += ["", f"**incomplete:** {markdown(self.incomplete)}"] * bool(self.incomplete)
         return "\n".join(lines)
 
     def _rms(self, name: str, body: str, factor: float) -> str:
