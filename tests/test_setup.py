@@ -250,7 +250,10 @@ def test_ci_is_make_test_and_fails_with_it(tmp_path):
     "packages, output",
     [
         ('echo ii; shift 3; for package; do echo "ii $package"; done', ""),
-        ("exit 1", "[set-up] without a screen there will be no pictures, nor the tests of them; for them: apt install mesa-"),
+        (
+            "exit 1",
+            "[set-up] without a screen there will be no pictures, nor the tests of them; for them: apt install mesa-",
+        ),
     ],
     ids=["there", "missing, and sudo wants a password"],
 )

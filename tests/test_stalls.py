@@ -134,6 +134,10 @@ def test_a_diagnosis_that_was_stopped_gives_the_same_answer(stage):
         stage.spin_until(lambda: diagnosis.poll() is not None, "it has ended")
         assert diagnosis.returncode == 0
         if stop:
-            assert (given.verdict, given.number, given.ranking) == (undisturbed.verdict, undisturbed.number, undisturbed.ranking)
+            assert (given.verdict, given.number, given.ranking) == (
+                undisturbed.verdict,
+                undisturbed.number,
+                undisturbed.ranking,
+            )
             assert (given.rms_before, given.rms_after) == (undisturbed.rms_before, undisturbed.rms_after)
         undisturbed = given

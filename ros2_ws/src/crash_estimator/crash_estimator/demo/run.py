@@ -156,9 +156,7 @@ class Run:
         for name, choice in self.choices.items():
             has = self.watch.has(name)
             lost = self.watch.total - has
-            self.terminal.say(
-                f"\n{name}: model {choice.model}, method {choice.method}, {has} samples, {lost} lost\n"
-            )
+            self.terminal.say(f"\n{name}: model {choice.model}, method {choice.method}, {has} samples, {lost} lost\n")
             found = self.watch.said[name].found()
             errors = equation_errors(*found) if found else []
             if any(error.samples for error in errors):

@@ -104,7 +104,9 @@ class WholeEstimates:
         try:
             about = about_of(raw, TOPICS[topic])
         except (struct.error, RuntimeError):
-            return self.node.get_logger().error(f"{self.name}/{topic}: no such message: left out", throttle_duration_sec=5.0)
+            return self.node.get_logger().error(
+                f"{self.name}/{topic}: no such message: left out", throttle_duration_sec=5.0
+            )
         state = self.attending.replay_state
         first = state.first if state and state.run == about.run else about.number
         self.streams[topic].receive(about, raw, first)
