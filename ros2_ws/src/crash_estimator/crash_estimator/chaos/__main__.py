@@ -5,7 +5,8 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from ..cli.common import guarded
+from crash_replay.fault import guarded
+
 from ..figures import write_markdown
 from .case import case_of
 from .judge import FAILED

@@ -50,7 +50,7 @@ class Faults:
     def _begin(self, fault: Fault, process: int, now: float) -> None:
         self.log.append(f"{fault.name}: process {process}, {self.run.played:.0f} % of the samples sent")
         top = self.run.top(fault.member)
-        come_back: Callable[[], None] = lambda: None  # noqa: E731
+        come_back: Callable[[], None] = lambda: None
         if fault.kind == HANG_UP:
             top.hang_up()
         elif fault.kind in (KILL, RESTART) and top:
@@ -58,7 +58,7 @@ class Faults:
             come_back = top.start
         elif fault.kind == STOP:
             send(process, signal.SIGSTOP)
-            come_back = lambda: send(process, signal.SIGCONT)  # noqa: E731
+            come_back = lambda: send(process, signal.SIGCONT)
         else:
             send(process, signal.SIGKILL)
         if fault.kind in LASTING:
