@@ -108,6 +108,17 @@ def children_of(parent: int) -> list[int]:
     return found + [grandchild for child in found for grandchild in children_of(child)]
 
 
+def largest_written(process: int) -> int:
+    """Bytes of the largest file that a process has open for writing."""
+    largest = 0
+    for handle in Path(f"/proc/{process}/fd").glob("*"):
+        with suppress(OSError):
+            flags = Path(f"/proc/{process}/fdinfo/{handle.name}").read_text().split("flags:")[1].split()[0]
+            if int(flags, 8) & os.O_ACCMODE and handle.is_file():
+                largest = max(largest, handle.stat().st_size)
+    return largest
+
+
 def command_line(process: int) -> str:
     """Empty where there is no such process."""
     try:
