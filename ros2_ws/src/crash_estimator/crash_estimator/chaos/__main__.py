@@ -5,7 +5,8 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from ..cli.common import guarded
+from crash_replay.fault import guarded
+
 from ..figures import write_markdown
 from .case import case_of
 from .judge import FAILED
@@ -41,7 +42,7 @@ def _run(arguments: argparse.Namespace) -> int:
     arguments.out.mkdir(parents=True, exist_ok=True)
     (arguments.out / RESULTS).unlink(missing_ok=True)
     try:
-        found = references(cases, arguments.out)
+        found = references(cases, arguments.out, arguments.jobs)
     except NoReference as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

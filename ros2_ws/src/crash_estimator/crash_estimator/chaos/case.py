@@ -8,12 +8,12 @@ from crash_replay.recording import RecordingError
 STARTED, PLAYED, FINISHED = "started", "played", "finished"
 """What a moment is counted from: the member's start, s; the share of the samples sent, %; the last sample, s."""
 
-KILL, STOP, RESTART, HANG_UP = "kill", "stop", "restart", "hang_up"
+KILL, STOP, RESTART, HANG_UP, FULL_DISK = "kill", "stop", "restart", "hang_up", "full_disk"
 """Of a member: SIGKILL; SIGSTOP, and SIGCONT after so many seconds; SIGKILL, and the same once more after so many
-seconds; its terminal is closed."""
+seconds; its terminal is closed; no file that it writes can grow any more."""
 ONE_CORE, BUSY, COLD_CACHES = "one_core", "busy", "cold_caches"
 """Of the whole run: one core, with another process beside it; eight of them beside it; nothing compiled yet."""
-OF_A_MEMBER = (KILL, STOP, RESTART, HANG_UP)
+OF_A_MEMBER = (KILL, STOP, RESTART, HANG_UP, FULL_DISK)
 OF_THE_RUN = (ONE_CORE, BUSY, COLD_CACHES)
 LASTING = (STOP, RESTART)
 

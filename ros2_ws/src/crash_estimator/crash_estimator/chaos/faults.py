@@ -1,12 +1,16 @@
 """Carries out the faults of a case, each at its moment."""
 
+import resource
 import signal
 import time
 from collections.abc import Callable
 from typing import Protocol
 
-from .case import FINISHED, HANG_UP, KILL, LASTING, PLAYED, RESTART, STOP, Fault
-from .members import Member, send
+from .case import FINISHED, FULL_DISK, HANG_UP, KILL, LASTING, PLAYED, RESTART, STOP, Fault
+from .members import Member, children_of, largest_written, send
+
+ROOM = 65536
+"""Bytes that fit into any file though the disk is full: what a process says goes into one too."""
 
 
 class Disturbed(Protocol):
@@ -50,7 +54,7 @@ class Faults:
     def _begin(self, fault: Fault, process: int, now: float) -> None:
         self.log.append(f"{fault.name}: process {process}, {self.run.played:.0f} % of the samples sent")
         top = self.run.top(fault.member)
-        come_back: Callable[[], None] = lambda: None  # noqa: E731
+        come_back: Callable[[], None] = lambda: None
         if fault.kind == HANG_UP:
             top.hang_up()
         elif fault.kind in (KILL, RESTART) and top:
@@ -58,7 +62,11 @@ class Faults:
             come_back = top.start
         elif fault.kind == STOP:
             send(process, signal.SIGSTOP)
-            come_back = lambda: send(process, signal.SIGCONT)  # noqa: E731
+            come_back = lambda: send(process, signal.SIGCONT)
+        elif fault.kind == FULL_DISK:
+            for one in [process, *children_of(process)]:
+                full = max(largest_written(one), ROOM)
+                resource.prlimit(one, resource.RLIMIT_FSIZE, (full, full))
         else:
             send(process, signal.SIGKILL)
         if fault.kind in LASTING:

@@ -40,6 +40,7 @@ class Outcome(NamedTuple):
     products: Mapping[str, Product]
     sent: bool = True  # at least one sample
     endless: str = ""  # what was waited for when the limit was reached
+    broken: str = ""  # a file that cannot be read
 
 
 class Verdict(NamedTuple):
@@ -69,6 +70,8 @@ def judged(outcome: Outcome, reference: Mapping[str, Content]) -> Verdict:
 def _fault_of_a_program(outcome: Outcome) -> str:
     if outcome.endless:
         return f"endless wait: {outcome.endless}"
+    if outcome.broken:
+        return outcome.broken
     for ended in outcome.ended:
         if ended.status is None:
             return f"{ended.name} did not end when it was told to"

@@ -16,7 +16,6 @@ from pathlib import Path
 from threading import Thread
 
 from ament_index_python.packages import get_package_prefix
-
 from crash_replay.processes import has_ended
 
 from ..demo.children import end_with
@@ -107,6 +106,17 @@ def children_of(parent: int) -> list[int]:
         if int(fields[1]) == parent and not has_ended(int(stat.parent.name)):
             found.append(int(stat.parent.name))
     return found + [grandchild for child in found for grandchild in children_of(child)]
+
+
+def largest_written(process: int) -> int:
+    """Bytes of the largest file that a process has open for writing."""
+    largest = 0
+    for handle in Path(f"/proc/{process}/fd").glob("*"):
+        with suppress(OSError):
+            flags = Path(f"/proc/{process}/fdinfo/{handle.name}").read_text().split("flags:")[1].split()[0]
+            if int(flags, 8) & os.O_ACCMODE and handle.is_file():
+                largest = max(largest, handle.stat().st_size)
+    return largest
 
 
 def command_line(process: int) -> str:

@@ -1,22 +1,20 @@
 """Listens to a run: what the estimators and the diagnosis say, how far the replay is, who says what of himself."""
 
-import hashlib
 import time
-from array import array
 from collections.abc import Callable, Sequence
 from functools import partial
 
-import numpy as np
 import rclpy
 from crash_msgs.msg import Attendance as AttendanceMessage
 from crash_msgs.msg import Parameters, Ranking, ReplayState
 from crash_msgs.srv import GetEstimates
-from rclpy.experimental.events_executor import EventsExecutor
-from rclpy.node import Node
-
 from crash_replay.attendance import Attendance, Word
 from crash_replay.attending import TOPIC
 from crash_replay.qos import EVERY_SAMPLE, EVERY_SAMPLE_SAID, LATCHED, SAID
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+
+from .contents import answer_in, estimates_in
 
 PIECE = 100
 """Samples that an estimator is asked for at once."""
@@ -88,18 +86,14 @@ class Observer:
         self.node.destroy_client(client)
 
     def _on_parameters(self, name: str, message: Parameters) -> None:
-        samples = len(message.time_ns)
-        rows = [_rows(message.value, samples), _rows(message.std, samples), _rows(message.status, samples)]
-        for k in range(samples):
-            number, digest = message.number + k, _digest(*(row[k].tobytes() for row in rows))
+        for number, digest in estimates_in(message):
             if self.estimates[name].setdefault(number, digest) != digest:
                 self.contradictions[name].add(number)
                 self.estimates[name][number] = digest
 
     def _on_ranking(self, message: Ranking) -> None:
         if message.final:
-            found = ", ".join(message.found) or "nothing"
-            self.final[message.revision] = f"{message.model}: {message.text} ({found})"
+            self.final[message.revision] = answer_in(message)
 
     def _on_state(self, message: ReplayState) -> None:
         self.state = message
@@ -107,11 +101,3 @@ class Observer:
 
     def _on_word(self, message: AttendanceMessage) -> None:
         self.words.hear(Word(*(getattr(message, field) for field in Word._fields)))
-
-
-def _rows(values: array, samples: int) -> np.ndarray:
-    return np.asarray(values).reshape(samples, -1)
-
-
-def _digest(*parts: bytes) -> str:
-    return hashlib.blake2b(b"".join(parts), digest_size=8).hexdigest()

@@ -3,35 +3,42 @@
 import random
 from collections.abc import Sequence
 
-from .case import COLD_CACHES, FINISHED, HANG_UP, KILL, ONE_CORE, PLAYED, RESTART, STARTED, STOP, Case, Fault
+from .case import COLD_CACHES, FINISHED, FULL_DISK, HANG_UP, KILL, ONE_CORE, PLAYED, RESTART, STARTED, STOP, Case, Fault
 from .recordings import RECORDINGS
 
 MEMBERS = {
-    "terminals": ("replay", "kalman", "rls", "diagnosis", "worker"),
-    "estimators": ("replay", "kalman", "rls"),
+    "estimators": ("replay", "kalman", "rls", "record"),
+    "terminals": ("replay", "kalman", "rls", "record", "diagnosis", "worker"),
+    "shown": ("replay", "kalman", "rls", "record", "viewer"),
 }
 """Of each use, those that a fault may befall."""
-STOPS = ((0.5, 3.0), (3.0, 6.0), (6.0, 20.0))
-"""s: within the middleware's lease of 5 s, about it, and beyond."""
+WRITING = ("record", "viewer")
+"""Those that write a file."""
+TURNS = ("estimators", "terminals", "estimators", "shown", "estimators", "terminals")
+"""In turn."""
+STOPS = ((0.5, 3.0), (0.5, 3.0), (3.0, 8.0), (10.0, 20.0))
+"""s."""
 LONG_STOP = 60.0
 GONE = (0.2, 6.0)
 """s between a kill and the start of the same."""
 
-KINDS = (KILL, STOP, RESTART, STOP, KILL, HANG_UP, STOP, RESTART)
+KINDS = (KILL, STOP, RESTART, STOP, KILL, HANG_UP, STOP, FULL_DISK)
 """In turn; a stop is what happens most often to a process."""
-EVERY_SECOND_FAULT, EVERY_ONE_CORE, EVERY_LONG_STOP, EVERY_COLD = 4, 8, 23, 67
+EVERY_SECOND_FAULT, EVERY_ONE_CORE, EVERY_LONG_STOP, EVERY_COLD = 4, 8, 43, 101
 """Every so many runs has a second fault, one core only, a stop of a minute, nothing compiled."""
 
 
 def plan(seed: int, runs: int, uses: Sequence[str] = tuple(MEMBERS)) -> list[Case]:
     """The same cases for the same seed, and any beginning of them a mixture of all."""
-    draw = random.Random(seed)
-    return [_case(draw, k // len(uses), uses[k % len(uses)]) for k in range(runs)]
+    draw, turns = random.Random(seed), [use for use in TURNS if use in uses]
+    rounds = [k // len(turns) for k in range(runs)]
+    return [_case(draw, k, k + rounds[k], turns[k % len(turns)]) for k in range(runs)]
 
 
-def _case(draw: random.Random, turn: int, use: str) -> Case:
+def _case(draw: random.Random, turn: int, kind: int, use: str) -> Case:
+    """kind: so counted that each use has each kind of fault in turn."""
     recording = draw.choices(list(RECORDINGS), weights=(1, 3))[0]
-    faults = [_fault(draw, use, KINDS[turn % len(KINDS)])]
+    faults = [_fault(draw, use, KINDS[kind % len(KINDS)])]
     if turn % EVERY_SECOND_FAULT == EVERY_SECOND_FAULT - 1:
         faults.append(_fault(draw, use, draw.choice((KILL, STOP, STOP, RESTART))))
     if turn % EVERY_LONG_STOP == EVERY_LONG_STOP - 1:
@@ -44,7 +51,7 @@ def _case(draw: random.Random, turn: int, use: str) -> Case:
 
 
 def _fault(draw: random.Random, use: str, kind: str) -> Fault:
-    members = [m for m in MEMBERS[use] if m != "worker" or kind in (KILL, STOP)]
+    members = [m for m in MEMBERS[use] if _can_befall(kind, m)]
     member = draw.choice(members)
     anchor, at = draw.choice(
         (
@@ -57,3 +64,11 @@ def _fault(draw: random.Random, use: str, kind: str) -> Fault:
     )
     seconds = {STOP: draw.uniform(*draw.choice(STOPS)), RESTART: draw.uniform(*GONE)}.get(kind, 0.0)
     return Fault(kind, member, anchor, float(at), round(seconds, 1))
+
+
+def _can_befall(kind: str, member: str) -> bool:
+    if kind == FULL_DISK:
+        return member in WRITING
+    if kind == RESTART:
+        return member not in ("worker", *WRITING)  # a second recorder overwrites nothing
+    return member != "worker" or kind in (KILL, STOP)

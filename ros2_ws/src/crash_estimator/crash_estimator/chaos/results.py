@@ -19,15 +19,16 @@ class NoReference(RuntimeError):
     """Undisturbed it is not complete either; the message is one readable line."""
 
 
-def references(cases: Sequence[Case], out: Path) -> dict[str, dict[str, Content]]:
+def references(cases: Sequence[Case], out: Path, jobs: int = 1) -> dict[str, dict[str, Content]]:
     """What each use makes of each recording undisturbed, by the name of that case."""
+    undisturbed = list(dict.fromkeys(case.undisturbed for case in cases))
+    for recording in {case.recording for case in undisturbed}:
+        bag_of(recording, out / "recordings")  # not by several at once
     found = {}
-    for case in dict.fromkeys(case.undisturbed for case in cases):
-        bag_of(case.recording, out / "recordings")  # not by several at once
-        row = next(_in_processes([case], out, {case.name: None}, 1))
+    for row in _in_processes(undisturbed, out, {case.name: None for case in undisturbed}, jobs):
         if row["verdict"] != COMPLETE:
-            raise NoReference(f"{case.name}: {row['verdict']}: {row['why']}; its logs are in {out / 'logs'}")
-        found[case.name] = row["contents"]
+            raise NoReference(f"{row['case']}: {row['verdict']}: {row['why']}; its logs are in {out / 'logs'}")
+        found[row["case"]] = row["contents"]
     return found
 
 

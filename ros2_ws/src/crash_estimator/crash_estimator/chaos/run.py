@@ -9,11 +9,11 @@ from pathlib import Path
 from ..demo.domain import free_domain
 from .case import BUSY, COLD_CACHES, HANG_UP, ONE_CORE, Case
 from .faults import Faults
-from .judge import Content, Ended, Outcome, Product, Verdict, judged
+from .judge import Content, Ended, Outcome, Verdict, judged
 from .members import Member, children_of, command_line, send
 from .observer import Observer
 from .recordings import bag_of
-from .uses import DIAGNOSIS, ESTIMATORS, USES
+from .uses import DIAGNOSIS, ESTIMATORS, USES, Broken
 
 LIMIT = 180.0
 """s that a run may take, beside the time for which its faults last."""
@@ -60,10 +60,14 @@ class Run:
                 os.sched_setaffinity(0, {min(cores)})  # what is started inherits it
             for k in range((ONE_CORE in self.conditions) + BURNING * (BUSY in self.conditions)):
                 self._start(f"burner {k}", ["sh", "-c", "while :; do :; done"])
-            self.use = USES[self.case.use](self.case, self.bag, self._start, self.observer)
+            self.use = USES[self.case.use](self.case, self.bag, self.folder, self._start, self.observer)
             endless = self._follow()
             ended = self._end()
-            return Outcome(ended, self._products(), self.observer.sent_any, endless)
+            try:
+                products, broken = self.use.products(), ""
+            except Broken as error:
+                products, broken = {}, str(error)
+            return Outcome(ended, products, self.observer.sent_any, endless, broken)
         finally:
             os.sched_setaffinity(0, cores)
             self._end_all()
@@ -109,15 +113,6 @@ class Run:
     def strangers(self) -> list[str]:
         """Nodes that take part and are not of the run: somebody else came upon the same ROS domain."""
         return sorted(set(self.observer.words.names()) - {f"/{name}" for name in self.tops})
-
-    def _products(self) -> dict[str, Product]:
-        made = {
-            f"estimates of {name}": Product(name, {str(k): v for k, v in estimates.items()})
-            for name, estimates in self.observer.estimates.items()
-        }
-        if DIAGNOSIS in self.tops:
-            made["diagnosis"] = Product(DIAGNOSIS, {str(k): v for k, v in self.observer.final.items()})
-        return made
 
     def _start(self, name: str, command: list[str]) -> Member:
         log = self.folder / f"{name}.log"

@@ -1,22 +1,25 @@
 """How the project is used in a run: which processes are started, when it is over, what they have made."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
 from .case import RESTART, Case
+from .contents import recorded
+from .judge import Product
 from .members import Member, node_command
 from .observer import Observer
 from .recordings import PLAYING, PLAYING_WITH_RESTART, RECORDINGS
 
 ESTIMATORS = {"kalman": "constrained_kalman", "rls": "rls"}
 """Name -> method."""
-DIAGNOSIS, REPLAY = "diagnosis", "replay"
+REPLAY, DIAGNOSIS, VIEWER, RECORD = "replay", "diagnosis", "viewer", "record"
+RECORDING, RRD = "recording.mcap", "crash.rrd"
 RANKED_EVERY = 0.02
 """s of the crash between two rankings on the way: most of a run's processor goes into the diagnosis."""
-WAITING = 120.0
-"""s that the replay waits for its listeners."""
+WAITING = 40.0
+"""s that the replay waits for its listeners, beside those for which faults last."""
 STARTING = 60.0
 """s for a process to say its first word."""
 SETTLING = 10.0
@@ -27,23 +30,33 @@ ANSWERING = 120.0
 Start = Callable[[str, list[str]], Member]
 
 
-class Terminals:
-    """Replay, estimators and diagnosis, each from a terminal of its own; the user ends them when they are done."""
+class Broken(RuntimeError):
+    """A file that was left cannot be read; the message is one line."""
 
-    def __init__(self, case: Case, bag: Path, start: Start, observer: Observer, diagnosed: bool = True):
+
+class Terminals:
+    """Replay, estimators, record and more, each from a terminal of its own; the user ends them when they are done."""
+
+    def __init__(self, case: Case, bag: Path, folder: Path, start: Start, observer: Observer, also: Sequence[str] = ()):
+        """also: the diagnosis, the viewer."""
         self.observer = observer
         short, model = RECORDINGS[case.recording], RECORDINGS[case.recording].model
         returns = any(fault.kind == RESTART for fault in case.faults)
         rate = short.seconds / (PLAYING_WITH_RESTART if returns else PLAYING)
-        self.members = [
-            start(name, node_command("crash_estimator", "estimator", name, model=model, method=method))
+        commands = {
+            name: node_command("crash_estimator", "estimator", name, model=model, method=method)
             for name, method in ESTIMATORS.items()
-        ]
-        often = {"every": RANKED_EVERY}
-        if diagnosed:
-            self.members.append(start(DIAGNOSIS, node_command("crash_estimator", "diagnosis", model=model, **often)))
-        asked = {"listeners": [member.name for member in self.members], "wait_timeout": WAITING, "rate": round(rate, 6)}
-        self.members.append(start(REPLAY, node_command("crash_replay", "replay", bag=str(bag), **asked)))
+        }
+        if DIAGNOSIS in also:
+            commands[DIAGNOSIS] = node_command("crash_estimator", "diagnosis", model=model, every=RANKED_EVERY)
+        if VIEWER in also:
+            shown = {"rrd": str(folder / RRD), "port": 0, "open": False}
+            commands[VIEWER] = node_command("crash_estimator", "viewer", estimators=[*ESTIMATORS], **shown)
+        self.recording = folder / RECORDING
+        commands[RECORD] = node_command("crash_replay", "record", to=str(self.recording), wait_for=len(ESTIMATORS))
+        asked = {"listeners": [*commands], "wait_timeout": WAITING + case.seconds, "rate": round(rate, 6)}
+        commands[REPLAY] = node_command("crash_replay", "replay", bag=str(bag), **asked)
+        self.members = [start(name, command) for name, command in commands.items()]
         self.replay_ended = 0.0
 
     def is_over(self) -> bool:
@@ -60,11 +73,39 @@ class Terminals:
         word = self.observer.words.word(f"/{name}")
         if word is None:  # it is still being started: nobody ends what he has just begun
             return waited > STARTING
-        if word.done and word.total:
+        if word.done and word.total and name != RECORD:  # which ends by itself
             return True
         has_all = word.total and word.next >= word.total and not word.missing
-        return waited > (ANSWERING if name == DIAGNOSIS and has_all else SETTLING)
+        answering = any(m.name == DIAGNOSIS and m.status is None for m in self.members)
+        return waited > (ANSWERING if has_all and answering and name in (DIAGNOSIS, RECORD) else SETTLING)
+
+    def products(self) -> dict[str, Product]:
+        """Raises Broken."""
+        made = {f"estimates of {name}": Product(name, said) for name, said in heard(self.observer).items()}
+        if any(member.name == DIAGNOSIS for member in self.members):
+            made["diagnosis"] = Product(DIAGNOSIS, answers(self.observer))
+        made["recording"] = Product(RECORD, self._recorded())
+        return made
+
+    def _recorded(self) -> dict[str, str]:
+        try:
+            return recorded(self.recording) if self.recording.exists() else {}
+        except Exception as error:
+            raise Broken(f"{RECORDING} does not open with mcap's reader: {error!r}") from error
 
 
-USES: dict[str, Callable[..., Terminals]] = {"terminals": Terminals, "estimators": partial(Terminals, diagnosed=False)}
-"""estimators: the same without the diagnosis, which takes most of the time."""
+def heard(observer: Observer) -> dict[str, dict[str, str]]:
+    """The estimates of each estimator."""
+    return {name: {str(k): v for k, v in estimates.items()} for name, estimates in observer.estimates.items()}
+
+
+def answers(observer: Observer) -> dict[str, str]:
+    return {str(k): v for k, v in observer.final.items()}
+
+
+USES: dict[str, Callable[..., Terminals]] = {
+    "estimators": Terminals,
+    "terminals": partial(Terminals, also=(DIAGNOSIS,)),
+    "shown": partial(Terminals, also=(VIEWER,)),
+}
+"""estimators, shown: without the diagnosis, which takes most of the time."""

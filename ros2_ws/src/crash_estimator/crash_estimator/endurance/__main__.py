@@ -1,16 +1,22 @@
 """`endurance`: long runs through every method and every node, and docs/endurance.md about them."""
 
 import argparse
+import json
 import sys
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
-from ..cli.common import guarded
+from crash_replay.fault import guarded
+
 from ..figures import markdown_table, write_markdown
 from .methods import METHODS, Endured, endure
-from .nodes import Grown, passes_in_a_row, tests_in_a_row
+from .nodes import Grown, Size, passes_in_a_row, tests_in_a_row
 
+PARTS = ["methods", "tests", "passes"]
+RESULTS = "results.jsonl"
+"""In the folder of results: an array of JSON for each method and each node."""
 MEGABYTE = 1e6
 GROWTH = 0.05
 """Share by which memory may grow after the first tenth: allocators keep what they once had, at most so much of it."""
@@ -22,28 +28,53 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="endurance", description=__doc__.partition(": ")[2])
     parser.add_argument("--samples", type=int, default=1_000_000, metavar="N", help="default %(default)s")
     parser.add_argument("--times", type=int, default=500, metavar="N", help="tests, and passes; default %(default)s")
-    parser.add_argument("--only", choices=["methods", "tests", "passes"], help="only this part")
-    parser.add_argument("--out", type=Path, default=Path("out/endurance"), help="for logs, default %(default)s")
+    parser.add_argument("--only", choices=PARTS, help="only this part; the page keeps what is known of the others")
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS, help="default: all")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/endurance"), help="for logs and results, default %(default)s"
+    )
     parser.add_argument("--to", type=Path, default=Path("docs/endurance.md"), metavar="PAGE.md")
     arguments = parser.parse_args()
     return guarded(lambda: _run(arguments))
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    methods, grown = [], []
-    if arguments.only in (None, "methods"):
-        for method in METHODS:  # each in a fresh process: its memory is its own
+    parts = [arguments.only] if arguments.only else PARTS
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    results, sound = arguments.out / RESULTS, True
+    if not arguments.only:
+        results.unlink(missing_ok=True)
+    for one in _results(parts, arguments):
+        with results.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(one) + "\n")
+        is_well, row = (is_sound, method_row) if isinstance(one, Endured) else (is_flat, node_row)
+        print(" ".join(row(one)), flush=True)
+        sound &= is_well(one)
+    write_markdown(arguments.to, [page(*kept(results))])
+    return 0 if sound else 1
+
+
+def _results(parts: Sequence[str], arguments: argparse.Namespace) -> Iterator[Endured | Grown]:
+    if "methods" in parts:
+        for method in arguments.methods:  # each in a fresh process: its memory is its own
             with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-                methods.append(pool.submit(endure, method, arguments.samples).result())
-            print(" ".join(method_row(methods[-1])), flush=True)
+                yield pool.submit(endure, method, arguments.samples).result()
     for part, function in (("tests", tests_in_a_row), ("passes", passes_in_a_row)):
-        if arguments.only in (None, part):
-            grown += function(arguments.out, arguments.times)
-            for one in grown:
-                print(" ".join(node_row(one)), flush=True)
-    if arguments.only is None:
-        write_markdown(arguments.to, [page(methods, grown)])
-    return 0 if all(map(is_sound, methods)) and all(map(is_flat, grown)) else 1
+        if part in parts:
+            yield from function(arguments.out, arguments.times)
+
+
+def kept(results: Path) -> tuple[list[Endured], list[Grown]]:
+    """What is known of each method and each node: of several results the last."""
+    methods, grown = {}, {}
+    for line in results.read_text(encoding="utf-8").splitlines():
+        row = json.loads(line)
+        if len(row) == len(Endured._fields):
+            methods[row[0]] = Endured(*row)
+        else:
+            node, what, times, settled, end = row
+            grown[node, what] = Grown(node, what, times, Size(*settled), Size(*end))
+    return [methods[name] for name in METHODS if name in methods], list(grown.values())
 
 
 def is_sound(one: Endured) -> bool:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crash_msgs.msg import Samples, TestInfo
-
 from crash_replay.bag import read_bag
 from crash_replay.qos import LATCHED, STREAM
 from crash_replay.recording import Recording
@@ -108,7 +107,7 @@ def tests_in_a_row(out: Path, times: int) -> list[Grown]:
             test.publish(message)
             g.observer.spin(0.02)
             _send(recording, whole, samples, g)
-            through = lambda name: _is_through(words.word(f"/{name}"), whole)  # noqa: E731
+            through = lambda name, whole=whole: _is_through(words.word(f"/{name}"), whole)
             g.wait(through, list(nodes), f"test {k} is dealt with")
             if k == round(SETTLED * times):
                 settled = g.sizes()
@@ -138,8 +137,8 @@ def passes_in_a_row(out: Path, times: int) -> list[Grown]:
         ),
     }  # fmt: skip
     with graph(out / "passes", nodes) as g:
-        run = lambda: g.observer.state.run if g.observer.state else 0  # noqa: E731
-        began = lambda _: run() >= round(SETTLED * times)  # noqa: E731
+        run = lambda: g.observer.state.run if g.observer.state else 0
+        began = lambda _: run() >= round(SETTLED * times)
         g.wait(began, ["replay"], "the replay has made a tenth of its passes")
         settled, deadline = g.sizes(), time.monotonic() + PATIENCE
         while run() < times and time.monotonic() < deadline + times:
@@ -151,5 +150,5 @@ def passes_in_a_row(out: Path, times: int) -> list[Grown]:
 
 def size_of(process: int) -> Size:
     family = [process, *children_of(process)]
-    count = lambda folder: sum(len(list(Path(f"/proc/{one}/{folder}").glob("*"))) for one in family)  # noqa: E731
+    count = lambda folder: sum(len(list(Path(f"/proc/{one}/{folder}").glob("*"))) for one in family)
     return Size(sum(resident(one) for one in family), count("fd"), count("task"))
