@@ -8,8 +8,8 @@ from crash_estimator.core.diagnosis.candidates import candidates
 from crash_estimator.core.diagnosis.diagnosis import diagnose
 from crash_estimator.core.diagnosis.model import fit_model
 from crash_estimator.core.diagnosis.records import make_record
-from crash_estimator.core.diagnosis.scales import make_scales
 from crash_estimator.core.diagnosis.rounds import bounded
+from crash_estimator.core.diagnosis.scales import make_scales
 from crash_estimator.core.diagnosis.trying import OFFSET_STARTS, OFFSETS, offset_starts
 from crash_estimator.core.diagnosis.whiteness import Absorbed, whiteness, whiteness_of_fit
 from crash_estimator.core.effects import EFFECTS

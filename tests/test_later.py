@@ -12,7 +12,6 @@ from crash_estimator.nodes import later
 from crash_estimator.nodes.later import HOLD, RUSH, Later
 from crash_estimator.rush import LULL, PERIOD
 
-
 OVER = LULL + 2.0 * PERIOD
 
 

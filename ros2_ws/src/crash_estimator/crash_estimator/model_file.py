@@ -16,7 +16,6 @@ from .core.effects.base import Effect
 from .core.effects.targets import check_effects
 from .core.structure import Body, Coefficient, EffectSpec, Element, ModelError, Structure, Term
 
-
 MOST_PARTS = 100
 """Bodies, elements or effects: the work on a sample grows with the square of them and more."""
 

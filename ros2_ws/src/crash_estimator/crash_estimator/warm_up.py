@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 
+from crash_replay.said import say
 from crash_replay.synthetic.recordings import simulate_recording
 
 from .core.diagnosis.diagnosis import diagnose
@@ -50,7 +51,7 @@ def main() -> int:
             error = future.exception()
             failed += error is not None
             how = f"failed: {error}" if error else f"{future.result():.0f} s"
-            print(f"compiled {number} of {len(steps)}: {steps[future]}, {how}", flush=True)
+            say(f"compiled {number} of {len(steps)}: {steps[future]}, {how}")
     return 1 if failed else 0
 
 

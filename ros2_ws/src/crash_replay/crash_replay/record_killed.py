@@ -23,9 +23,11 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from .cdr import Serialized
+from .fault import guarded
 from .middleware import prepare_middleware
 from .qos import LATCHED, STREAM
 from .recorded_topics import about
+from .said import say
 
 AGE = 0.5
 """s; what was published so long before the kill must be in the file."""
@@ -151,6 +153,10 @@ def kills(count: int, seed: int) -> Iterator[Killed]:
 
 
 def main() -> int:
+    return guarded(killed_at_random)
+
+
+def killed_at_random() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
@@ -158,14 +164,13 @@ def main() -> int:
     found = []
     for killed in kills(arguments.kills, arguments.seed):
         found.append(killed)
-        print(
+        say(
             f"killed after {killed.moment:.3f} s: {killed.messages} messages, "
             + (killed.fault or f"the oldest that is missing is {killed.oldest_missing:.3f} s old"),
-            flush=True,
         )
     good = sum(killed.good for killed in found)
     worst = max((killed.oldest_missing for killed in found), default=0.0)
-    print(f"{good} of {len(found)} files open and lack nothing older than {AGE:g} s; the oldest: {worst:.3f} s")
+    say(f"{good} of {len(found)} files open and lack nothing older than {AGE:g} s; the oldest: {worst:.3f} s")
     return 0 if good == len(found) else 1
 
 

@@ -14,7 +14,6 @@ from ..core.structure import ModelError, Structure
 from ..model_file import load_model
 from .effects_plan import Case
 
-
 SAME_PLACE = 0.05
 """Of the gap: how far a stop may be from where it closes to count as the gap."""
 

@@ -16,8 +16,8 @@ from crash_replay.said import Parser, say
 from ..demo.domain import own_environment
 from ..figures import markdown_table, write_markdown
 from ..tables import table
-from .speed_growth import growth
 from .speed_graph import start_ros
+from .speed_growth import growth
 from .speed_live import Effort, Live
 from .speed_row import HEAD, Row
 from .speed_steps import steps

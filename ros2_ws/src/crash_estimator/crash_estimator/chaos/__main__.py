@@ -6,13 +6,14 @@ from collections import Counter
 from pathlib import Path
 
 from crash_replay.fault import guarded
+from crash_replay.said import say
 
 from ..figures import write_markdown
 from .case import case_of
 from .judge import FAILED
 from .page import page
 from .plan import MEMBERS, plan
-from .results import RESULTS, NoReference, references, rows
+from .results import RESULTS, references, rows
 
 RUNS, SEED = 200, 1
 FIRST_START = "terminals/frontal/busy+cold_caches"
@@ -41,18 +42,14 @@ def _run(arguments: argparse.Namespace) -> int:
         cases = [case for case in drawn if (arguments.only or "") in case.name]
     arguments.out.mkdir(parents=True, exist_ok=True)
     (arguments.out / RESULTS).unlink(missing_ok=True)
-    try:
-        found = references(cases, arguments.out, arguments.jobs)
-    except NoReference as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    found = references(cases, arguments.out, arguments.jobs)
     done = []
     for row in rows(cases, arguments.out, found, arguments.jobs):
         done.append(row)
         what = f"{row['verdict']}, {row['seconds']:g} s {row['why']}"
-        print(f"{len(done)}/{len(cases)} {row['case']}: {what}", flush=True)
+        say(f"{len(done)}/{len(cases)} {row['case']}: {what}")
     counts = Counter(row["verdict"] for row in done)
-    print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
+    say(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
     if not (name or arguments.only):
         write_markdown(arguments.to, [page(done, arguments.seed)])
     return 1 if counts[FAILED] else 0

@@ -16,6 +16,7 @@ from pathlib import Path
 from threading import Thread
 
 from ament_index_python.packages import get_package_prefix
+
 from crash_replay.processes import has_ended
 
 from ..demo.children import end_with

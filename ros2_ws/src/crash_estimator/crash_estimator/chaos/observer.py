@@ -8,11 +8,12 @@ import rclpy
 from crash_msgs.msg import Attendance as AttendanceMessage
 from crash_msgs.msg import Parameters, Ranking, ReplayState
 from crash_msgs.srv import GetEstimates
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+
 from crash_replay.attendance import Attendance, Word
 from crash_replay.attending import TOPIC
 from crash_replay.qos import EVERY_SAMPLE, EVERY_SAMPLE_SAID, LATCHED, SAID
-from rclpy.experimental.events_executor import EventsExecutor
-from rclpy.node import Node
 
 from .contents import answer_in, estimates_in
 

@@ -6,6 +6,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
 
+from crash_replay.fault import Fault
+
 from .case import Case
 from .judge import COMPLETE, Content
 from .recordings import bag_of
@@ -15,7 +17,7 @@ RESULTS = "results.jsonl"
 """In the folder of a run's logs: a row of JSON for each case."""
 
 
-class NoReference(RuntimeError):
+class NoReference(Fault):
     """Undisturbed it is not complete either; the message is one readable line."""
 
 

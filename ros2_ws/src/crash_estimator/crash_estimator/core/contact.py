@@ -19,7 +19,6 @@ from .estimate import ElementState, Event
 from .kinematics import Motion
 from .structure import Structure
 
-
 REVERSAL = 0.02
 """Share of the largest rate below which an elastic element's rate counts as noise, not as turning back."""
 

@@ -9,6 +9,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from crash_replay.fault import guarded
+from crash_replay.said import say
 
 from ..figures import markdown_table, write_markdown
 from .methods import METHODS, Endured, endure
@@ -48,7 +49,7 @@ def _run(arguments: argparse.Namespace) -> int:
         with results.open("a", encoding="utf-8") as file:
             file.write(json.dumps(one) + "\n")
         is_well, row = (is_sound, method_row) if isinstance(one, Endured) else (is_flat, node_row)
-        print(" ".join(row(one)), flush=True)
+        say(" ".join(row(one)))
         sound &= is_well(one)
     write_markdown(arguments.to, [page(*kept(results))])
     return 0 if sound else 1

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+
 from crash_replay.recording import Channel, Sample, Test
 
 from ..core.methods import make_estimator

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crash_msgs.msg import Samples, TestInfo
+
 from crash_replay.bag import read_bag
 from crash_replay.qos import LATCHED, STREAM
 from crash_replay.recording import Recording

@@ -10,6 +10,8 @@ from pathlib import Path
 from random import Random
 from time import monotonic
 
+from crash_replay.said import say
+
 from ..cli.common import guarded
 from ..core.structure import ModelError
 from ..figures import write_markdown
@@ -43,11 +45,11 @@ def fuzz(arguments: argparse.Namespace) -> int:
         if result.failed:
             file = save(result, arguments.failures)
             last = (result.detail.strip().splitlines() or [""])[-1][:200]
-            print(f"{result.target}, seed {result.seed}: {result.outcome}: {last}; again: --replay {file}", flush=True)
+            say(f"{result.target}, seed {result.seed}: {result.outcome}: {last}; again: --replay {file}")
         if len(results) % 2000 == 0:
-            print(f"{len(results)} of {len(work)} inputs, {monotonic() - start:.0f} s", flush=True)
+            say(f"{len(results)} of {len(work)} inputs, {monotonic() - start:.0f} s")
     failures = sum(result.failed for result in results)
-    print(
+    say(
         f"{len(results)} inputs, {failures} failures, {monotonic() - start:.0f} s; longest "
         f"{max(r.seconds for r in results):.2f} s, most memory {max(r.bytes for r in results) / 1e6:.0f} MB"
     )
@@ -152,7 +154,7 @@ def replay(file: Path) -> int:
         raise ModelError(f"{file}: not an input that `fuzz` has saved ({error})") from None
     restrict()
     result = tried(saved["target"], saved["seed"], files)
-    print(f"{result.target}: {result.outcome}, {result.seconds:.2f} s, {result.bytes / 1e6:.0f} MB\n{result.detail}")
+    say(f"{result.target}: {result.outcome}, {result.seconds:.2f} s, {result.bytes / 1e6:.0f} MB\n{result.detail}")
     return 1 if result.failed else 0
 
 

@@ -39,7 +39,19 @@ from . import live
 from .bags import spoilt_bag
 from .mutations import FLOATS, INTEGERS, NUMBERS, PYTHON, WORDS, spoilt, spoilt_message
 from .valid import (
-    CSV, EFFECT, EV5, MME, MODEL, NAMED, OUTPUT, RECORDING, SAMPLES, TEST_INFO, TIME_ZERO, Files, cdr,
+    CSV,
+    EFFECT,
+    EV5,
+    MME,
+    MODEL,
+    NAMED,
+    OUTPUT,
+    RECORDING,
+    SAMPLES,
+    TEST_INFO,
+    TIME_ZERO,
+    Files,
+    cdr,
 )  # fmt: skip
 
 

@@ -10,7 +10,16 @@ from ..figures import Line, Panel, draw, markdown_table
 from ..model_file import load_model
 from . import cases
 from .experiments import (
-    FOLDER, FRONTAL, GAUSS_NEWTON, PASSES, SETTLED, SIDE, Covariances, NoiseOrders, Ratios, white_limit,
+    FOLDER,
+    FRONTAL,
+    GAUSS_NEWTON,
+    PASSES,
+    SETTLED,
+    SIDE,
+    Covariances,
+    NoiseOrders,
+    Ratios,
+    white_limit,
 )  # fmt: skip
 
 TABLE_5_1 = {"rls": (1.47, 0.83, 1.46), "mrls": (0.94, 0.79, 0.90)}

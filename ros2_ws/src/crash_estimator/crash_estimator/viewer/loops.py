@@ -16,8 +16,8 @@ from .axes import Axis, axis_for, text
 from .blocks import ForceBlock
 from .cast import Cast, Color
 from .frames import frame_ends
-from .plausible import Limits
 from .pen import TIMELINE, Pen, path, points
+from .plausible import Limits
 from .units import MM
 
 WIDTH, HEIGHT = 1.35, 1.0

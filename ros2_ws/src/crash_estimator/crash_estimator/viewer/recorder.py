@@ -7,9 +7,8 @@ from collections.abc import Callable, Hashable
 from functools import partial
 from typing import NamedTuple
 
-from crash_replay.scheduling import step_back
-
 from crash_replay.complaints import Complaints
+from crash_replay.scheduling import step_back
 
 from ..core.structure import Structure
 from ..rush import Rush

@@ -7,8 +7,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ..recording import Channel, Recording, RecordingError
 from ..limits import DISPLACEMENT, VELOCITY
+from ..recording import Channel, Recording, RecordingError
 from ..yaml_schema import Text, load_yaml, number, suggestion
 
 Axis = Literal["x", "y", "z", ""]

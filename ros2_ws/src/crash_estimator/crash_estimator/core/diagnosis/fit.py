@@ -21,7 +21,6 @@ from .propagate import respond
 from .records import Record
 from .trajectory import Trajectory
 
-
 FADE = (Stage(200.0, 30.0, 16.0), Stage(80.0, 10.0, 8.0), Stage(30.0, 3.0, 4.0), Stage(0.0, 1.0, 2.0))
 """Stages of a fit that starts from the measured motion; then the observer is off and the noise as it is.
 

@@ -14,13 +14,30 @@ from crash_replay.recording import Test
 
 from ..kinematics import initial_motion
 from ..structure import (
-    CONTACT_FREQUENCY, TYPICAL_CRUSH, TYPICAL_RATE, Action, Body, Coefficient, EffectSpec, Element, ModelError,
+    CONTACT_FREQUENCY,
+    TYPICAL_CRUSH,
+    TYPICAL_RATE,
+    Action,
+    Body,
+    Coefficient,
+    EffectSpec,
+    Element,
+    ModelError,
     Structure,
 )  # fmt: skip
 from . import EFFECTS
 from .base import (
-    AttachedBody, BodyForce, BodyInertia, ChannelError, Effect, ElementForce, ElementMotion, Gap, PairSpring,
-    StaticFactor, UnloadingSlope,
+    AttachedBody,
+    BodyForce,
+    BodyInertia,
+    ChannelError,
+    Effect,
+    ElementForce,
+    ElementMotion,
+    Gap,
+    PairSpring,
+    StaticFactor,
+    UnloadingSlope,
 )  # fmt: skip
 from .targets import checked
 

@@ -18,7 +18,6 @@ from . import laws
 from .curves import steepest, straight
 from .specimen import Peaks, Specimen
 
-
 STOPPED = 60.0
 """rad/s, of an unmodelled body against its stop: some 60 g at 10 m/s, as an engine at the barrier."""
 
