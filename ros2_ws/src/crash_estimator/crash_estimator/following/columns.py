@@ -131,6 +131,9 @@ class Parts(Mapping):
 
     def __getitem__(self, field: str) -> np.ndarray:
         part = self.table[:, self.places["parameters" if field == "value" else field]]
+        if field == "covariance":
+            side = self.table[0, self.places["parameters"]].size
+            return part.reshape(-1, side, side)
         return part.astype(np.uint8) if field in ("status", "state") else part
 
     def __iter__(self) -> Iterator[str]:

@@ -10,9 +10,9 @@ from pathlib import Path
 from random import Random
 from time import monotonic
 
+from crash_replay.fault import guarded
 from crash_replay.said import say
 
-from ..cli.common import guarded
 from ..core.structure import ModelError
 from ..figures import write_markdown
 from .page import page
