@@ -160,7 +160,7 @@ def main(fd: int) -> None:
             Answerer(effects).try_out(structure)
         answerer = Answerer(effects, [read_bag(bag) for bag in bags])
         node.send(Reply(None))
-        with suppress(EOFError, BrokenPipeError):  # the node has gone
+        with suppress(EOFError, ConnectionError):  # the node has gone
             while True:
                 node.send(_reply(answerer, node.recv()))
 
