@@ -11,6 +11,8 @@ STOPPED = "estimators/frontal/stop:kalman@played30%:7s"
 KILLED = "estimators/frontal/kill:rls@played50%"
 HUNG_UP = "estimators/frontal/hang_up:kalman@played40%"
 WITHOUT_REPLAY = "estimators/frontal/kill:replay@played60%"
+WITHOUT_RECORD = "estimators/frontal/kill:record@played50%"
+FULL_DISK = "estimators/frontal/full_disk:record@played30%"
 
 
 @pytest.fixture(scope="module")
@@ -27,10 +29,12 @@ def reference(out):
 @pytest.mark.parametrize(
     "name, verdict, statuses",
     [
-        (STOPPED, COMPLETE, {"kalman": 0, "rls": 0, "replay": 0}),
-        (KILLED, SAID, {"kalman": 0, "rls": -9, "replay": 1}),
-        (HUNG_UP, SAID, {"kalman": -1, "rls": 0, "replay": 1}),
-        (WITHOUT_REPLAY, SAID, {"kalman": 1, "rls": 1, "replay": -9}),
+        (STOPPED, COMPLETE, {"kalman": 0, "rls": 0, "record": 0, "replay": 0}),
+        (KILLED, SAID, {"kalman": 0, "rls": -9, "record": 1, "replay": 1}),
+        (HUNG_UP, SAID, {"kalman": -1, "rls": 0, "record": 1, "replay": 1}),
+        (WITHOUT_REPLAY, SAID, {"kalman": 1, "rls": 1, "record": 1, "replay": -9}),
+        (WITHOUT_RECORD, SAID, {"kalman": 0, "rls": 0, "record": -9, "replay": 1}),
+        (FULL_DISK, SAID, {"kalman": 0, "rls": 0, "record": 1, "replay": 1}),
     ],
 )
 def test_run(name, verdict, statuses, out, reference):

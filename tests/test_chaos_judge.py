@@ -42,6 +42,7 @@ def outcome(content=WHOLE, replay=(0, ""), kalman=(0, ""), killed=(), had_all=Fa
         (FAILED, outcome(kalman=(-11, ""))),
         (FAILED, outcome(kalman=(None, ""))),
         (FAILED, outcome(endless="after 180 s still running: replay")),
+        (FAILED, outcome(broken="recording.mcap does not open")),
         (FAILED, outcome(kalman=(0, "Traceback (most recent call last):"))),
         (SAID, outcome({}, replay=(-9, ""), killed=["replay"], sent=False)),  # before anything was sent
         (FAILED, outcome({}, replay=(-9, ""), killed=["replay"], sent=True)),
@@ -67,9 +68,9 @@ def test_a_plan_is_that_of_its_seed():
 
 def test_the_plan_has_every_fault_on_every_member():
     befallen = {(fault.kind, fault.member) for case in plan(1, 200) for fault in case.faults}
-    members = ("replay", "kalman", "diagnosis", "worker")
+    members = ("replay", "kalman", "record", "diagnosis", "worker", "demo", "estimator")
     assert {(kind, member) for kind in ("kill", "stop") for member in members} <= befallen
-    assert {"restart", "hang_up", "one_core", "cold_caches"} <= {kind for kind, _ in befallen}
+    assert {"restart", "hang_up", "full_disk", "one_core", "cold_caches"} <= {kind for kind, _ in befallen}
 
 
 @pytest.mark.parametrize("name", ["terminals/side", "terminals/side/melt:replay@played3%", "terminals/side/stop"])
@@ -83,3 +84,8 @@ def test_the_example():
         "terminals", "side",
         (Fault("stop", "replay", "played", 35.0, 7.5), Fault("kill", "kalman", "finished", 0.2)),
     )  # fmt: skip
+
+
+def test_who_does_not_write_has_no_full_disk():
+    full = {fault.member for case in plan(1, 500) for fault in case.faults if fault.kind == "full_disk"}
+    assert full == {"record", "viewer", "demo"}

@@ -16,7 +16,7 @@ from .plan import MEMBERS, plan
 from .results import RESULTS, references, rows
 
 RUNS, SEED = 200, 1
-FIRST_START = "terminals/frontal/busy+cold_caches"
+FIRST_START = "demo/frontal/busy+cold_caches"
 
 
 def main() -> int:

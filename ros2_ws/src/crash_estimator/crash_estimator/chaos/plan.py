@@ -10,11 +10,26 @@ MEMBERS = {
     "estimators": ("replay", "kalman", "rls", "record"),
     "terminals": ("replay", "kalman", "rls", "record", "diagnosis", "worker"),
     "shown": ("replay", "kalman", "rls", "record", "viewer"),
+    "demo": ("demo", "replay", "estimator", "diagnosis", "worker"),
+    "demo_shown": ("demo", "replay", "estimator", "diagnosis", "viewer"),
 }
 """Of each use, those that a fault may befall."""
+DEMOS = ("demo", "demo_shown")
+"""Uses in which one process starts the others."""
 WRITING = ("record", "viewer")
 """Those that write a file."""
-TURNS = ("estimators", "terminals", "estimators", "shown", "estimators", "terminals")
+TURNS = (
+    "estimators",
+    "demo",
+    "terminals",
+    "estimators",
+    "demo",
+    "shown",
+    "estimators",
+    "demo",
+    "terminals",
+    "demo_shown",
+)
 """In turn."""
 STOPS = ((0.5, 3.0), (0.5, 3.0), (3.0, 8.0), (10.0, 20.0))
 """s."""
@@ -51,7 +66,9 @@ def _case(draw: random.Random, turn: int, kind: int, use: str) -> Case:
 
 
 def _fault(draw: random.Random, use: str, kind: str) -> Fault:
-    members = [m for m in MEMBERS[use] if _can_befall(kind, m)]
+    if kind == RESTART and use in DEMOS:  # which starts nobody again
+        kind = KILL
+    members = [member for member in MEMBERS[use] if _can_befall(kind, use, member)]
     member = draw.choice(members)
     anchor, at = draw.choice(
         (
@@ -66,9 +83,11 @@ def _fault(draw: random.Random, use: str, kind: str) -> Fault:
     return Fault(kind, member, anchor, float(at), round(seconds, 1))
 
 
-def _can_befall(kind: str, member: str) -> bool:
+def _can_befall(kind: str, use: str, member: str) -> bool:
     if kind == FULL_DISK:
-        return member in WRITING
+        return member in (*WRITING, "demo")
+    if member == "worker" or (use in DEMOS and member != "demo"):  # somebody else has started it
+        return kind in (KILL, STOP)
     if kind == RESTART:
-        return member not in ("worker", *WRITING)  # a second recorder overwrites nothing
-    return member != "worker" or kind in (KILL, STOP)
+        return member not in WRITING and use not in DEMOS  # a second recorder overwrites nothing
+    return True

@@ -13,7 +13,7 @@ from .judge import Content, Ended, Outcome, Verdict, judged
 from .members import Member, children_of, command_line, send
 from .observer import Observer
 from .recordings import bag_of
-from .uses import DIAGNOSIS, ESTIMATORS, USES, Broken
+from .uses import DEMO, DIAGNOSIS, ESTIMATORS, ESTIMATORS_OF, USES, Broken
 
 LIMIT = 180.0
 """s that a run may take, beside the time for which its faults last."""
@@ -26,8 +26,16 @@ BURNING = 8
 ENDING = 60.0
 """s for a process that is told to end."""
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-WORKER = "worker"
-"""The diagnosis's process that computes."""
+STARTED_BY_DEMO = ("demo", "replay", "diagnosis", "viewer")
+"""Names of nodes, beside the estimators'."""
+MARKS = {
+    "worker": "diagnosis_worker",  # the diagnosis's process that computes
+    "replay": "/crash_replay/replay ",
+    "estimator": "/crash_estimator/estimator ",
+    "diagnosis": "/crash_estimator/diagnosis ",
+    "viewer": "/crash_estimator/viewer ",
+}
+"""In the command lines of processes that we have not started ourselves."""
 
 
 class Run:
@@ -49,7 +57,8 @@ class Run:
         self.environment["PYTHONUNBUFFERED"] = "1"  # who is killed has said what he has said
         if COLD_CACHES in self.conditions:
             self.environment["NUMBA_CACHE_DIR"] = str(folder / "cache")
-        self.observer = Observer(domain, list(ESTIMATORS))
+        self.estimators = list(ESTIMATORS_OF.get(case.use, ESTIMATORS))
+        self.observer = Observer(domain, self.estimators)
         self.faults = Faults(list(case.faults), self)
 
     def outcome(self) -> Outcome:
@@ -83,8 +92,8 @@ class Run:
             if time.monotonic() > limit:
                 running = [member.name for member in self.use.members if member.status is None]
                 return f"after {LIMIT + self.case.seconds:g} s still running: {', '.join(running)}"
-        for name in ESTIMATORS:
-            if self.tops[name].status is None:
+        for name in self.estimators:
+            if name in self.tops and self.tops[name].status is None:
                 self.observer.ask_for_missed(name)
         return ""
 
@@ -106,13 +115,15 @@ class Run:
             member.process.wait()
 
     def _had_all(self, name: str) -> bool:
+        """Whether nobody but itself can know how it ended; the demonstration has nobody beside it."""
         word = self.observer.words.word(f"/{name}")
-        return word is not None and word.total > 0 and word.next >= word.total and not word.missing
+        return name == DEMO or (word is not None and word.total > 0 and word.next >= word.total and not word.missing)
 
     @property
     def strangers(self) -> list[str]:
         """Nodes that take part and are not of the run: somebody else came upon the same ROS domain."""
-        return sorted(set(self.observer.words.names()) - {f"/{name}" for name in self.tops})
+        own = {*self.tops, *self.estimators, *STARTED_BY_DEMO} if DEMO in self.tops else {*self.tops}
+        return sorted(set(self.observer.words.names()) - {f"/{name}" for name in own})
 
     def _start(self, name: str, command: list[str]) -> Member:
         log = self.folder / f"{name}.log"
@@ -125,14 +136,16 @@ class Run:
         return self.tops.get(name)
 
     def process(self, name: str) -> int:
-        if name == WORKER:
-            children = children_of(self.tops[DIAGNOSIS].process.pid)
-            return next((child for child in children if "diagnosis_worker" in command_line(child)), 0)
-        member = self.tops[name]
-        return member.process.pid if member.status is None else 0
+        member = self.tops.get(name)
+        if member:
+            return member.process.pid if member.status is None else 0
+        starter = self.tops[DIAGNOSIS if DIAGNOSIS in self.tops else DEMO]
+        mark = MARKS[name]
+        return next((child for child in children_of(starter.process.pid) if mark in command_line(child)), 0)
 
     def since_start(self, name: str) -> float:
-        return time.monotonic() - self.tops[DIAGNOSIS if name == WORKER else name].started_at
+        starter = self.tops.get(name) or self.tops[DIAGNOSIS if DIAGNOSIS in self.tops else DEMO]
+        return time.monotonic() - starter.started_at
 
     @property
     def played(self) -> float:

@@ -1,5 +1,6 @@
 """How the project is used in a run: which processes are started, when it is over, what they have made."""
 
+import re
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -7,18 +8,22 @@ from pathlib import Path
 
 from .case import RESTART, Case
 from .contents import recorded
-from .judge import Product
+from .judge import FAULTY, Product
 from .members import Member, node_command
 from .observer import Observer
 from .recordings import PLAYING, PLAYING_WITH_RESTART, RECORDINGS
 
 ESTIMATORS = {"kalman": "constrained_kalman", "rls": "rls"}
 """Name -> method."""
-REPLAY, DIAGNOSIS, VIEWER, RECORD = "replay", "diagnosis", "viewer", "record"
+REPLAY, DIAGNOSIS, VIEWER, RECORD, DEMO = "replay", "diagnosis", "viewer", "record", "demo"
+TOLD = re.compile(
+    r"all samples|what it lacks|not told from|share of|where it fails|the error falls|verdict with it|added to"
+)
+"""How the lines of the demonstration's story begin that are the same each time."""
 RECORDING, RRD = "recording.mcap", "crash.rrd"
 RANKED_EVERY = 0.02
 """s of the crash between two rankings on the way: most of a run's processor goes into the diagnosis."""
-WAITING = 40.0
+WAITING = 90.0
 """s that the replay waits for its listeners, beside those for which faults last."""
 STARTING = 60.0
 """s for a process to say its first word."""
@@ -103,9 +108,41 @@ def answers(observer: Observer) -> dict[str, str]:
     return {str(k): v for k, v in observer.final.items()}
 
 
-USES: dict[str, Callable[..., Terminals]] = {
+class Demo:
+    """`demo`, which starts the others itself."""
+
+    def __init__(
+        self, case: Case, bag: Path, folder: Path, start: Start, observer: Observer, options: Sequence[str] = ()
+    ):
+        self.observer, self.out = observer, folder / "out"
+        short = RECORDINGS[case.recording]
+        told = ["--recording", str(bag), "--model", short.model, "--rate", f"{short.seconds / PLAYING:.6f}"]
+        self.members = [start(DEMO, [*node_command("crash_estimator", DEMO), *told, "--out", str(self.out), *options])]
+
+    def is_over(self) -> bool:
+        return self.members[0].status is not None
+
+    def products(self) -> dict[str, Product]:
+        """Raises Broken."""
+        for log in self.out.rglob("*.log"):
+            if found := FAULTY.search(log.read_text(encoding="utf-8", errors="replace")):
+                raise Broken(f"{log.name}: {found[0]}")
+        made = {f"estimates of {name}": Product(DEMO, said) for name, said in heard(self.observer).items()}
+        return made | {"diagnosis": Product(DEMO, answers(self.observer)), "story": Product(DEMO, self._story())}
+
+    def _story(self) -> dict[str, str]:
+        """What it tells of the crash: the lines that are the same each time."""
+        lines = self.members[0].said().splitlines()
+        return {line: "" for line in lines if TOLD.match(line)}
+
+
+USES: dict[str, Callable[..., Terminals | Demo]] = {
     "estimators": Terminals,
     "terminals": partial(Terminals, also=(DIAGNOSIS,)),
     "shown": partial(Terminals, also=(VIEWER,)),
+    "demo": partial(Demo, options=("--no-viewer",)),
+    "demo_shown": Demo,
 }
-"""estimators, shown: without the diagnosis, which takes most of the time."""
+"""estimators, shown: without the diagnosis, which takes most of the time; demo: without the viewer."""
+ESTIMATORS_OF = {"demo": ("constrained_kalman",), "demo_shown": ("constrained_kalman",)}
+"""Names of their nodes where they are others."""
