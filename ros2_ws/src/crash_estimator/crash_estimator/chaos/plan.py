@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from .case import COLD_CACHES, FINISHED, FULL_DISK, HANG_UP, KILL, ONE_CORE, PLAYED, RESTART, STARTED, STOP, Case, Fault
 from .recordings import RECORDINGS
+from .uses import DEMOS
 
 MEMBERS = {
     "estimators": ("replay", "kalman", "rls", "record"),
@@ -14,8 +15,6 @@ MEMBERS = {
     "demo_shown": ("demo", "replay", "estimator", "diagnosis", "viewer"),
 }
 """Of each use, those that a fault may befall."""
-DEMOS = ("demo", "demo_shown")
-"""Uses in which one process starts the others."""
 WRITING = ("record", "viewer")
 """Those that write a file."""
 TURNS = (
@@ -52,7 +51,7 @@ def plan(seed: int, runs: int, uses: Sequence[str] = tuple(MEMBERS)) -> list[Cas
 
 def _case(draw: random.Random, turn: int, kind: int, use: str) -> Case:
     """kind: so counted that each use has each kind of fault in turn."""
-    recording = draw.choices(list(RECORDINGS), weights=(1, 3))[0]
+    recording = draw.choices(list(RECORDINGS), weights=(3, 1))[0]
     faults = [_fault(draw, use, KINDS[kind % len(KINDS)])]
     if turn % EVERY_SECOND_FAULT == EVERY_SECOND_FAULT - 1:
         faults.append(_fault(draw, use, draw.choice((KILL, STOP, STOP, RESTART))))

@@ -13,7 +13,7 @@ from .judge import Content, Ended, Outcome, Verdict, judged
 from .members import Member, children_of, command_line, send
 from .observer import Observer
 from .recordings import bag_of
-from .uses import DEMO, DIAGNOSIS, ESTIMATORS, ESTIMATORS_OF, USES, Broken
+from .uses import DEMO, DIAGNOSIS, USES, Broken, estimators_of
 
 LIMIT = 180.0
 """s that a run may take, beside the time for which its faults last."""
@@ -57,7 +57,7 @@ class Run:
         self.environment["PYTHONUNBUFFERED"] = "1"  # who is killed has said what he has said
         if COLD_CACHES in self.conditions:
             self.environment["NUMBA_CACHE_DIR"] = str(folder / "cache")
-        self.estimators = list(ESTIMATORS_OF.get(case.use, ESTIMATORS))
+        self.estimators = estimators_of(case)
         self.observer = Observer(domain, self.estimators)
         self.faults = Faults(list(case.faults), self)
 

@@ -144,5 +144,10 @@ USES: dict[str, Callable[..., Terminals | Demo]] = {
     "demo_shown": Demo,
 }
 """estimators, shown: without the diagnosis, which takes most of the time; demo: without the viewer."""
-ESTIMATORS_OF = {"demo": ("constrained_kalman",), "demo_shown": ("constrained_kalman",)}
-"""Names of their nodes where they are others."""
+DEMOS = ("demo", "demo_shown")
+"""Those in which one process starts the others."""
+
+
+def estimators_of(case: Case) -> list[str]:
+    """The names of their nodes; the demonstration calls its own as their model."""
+    return [RECORDINGS[case.recording].model] if case.use in DEMOS else list(ESTIMATORS)
