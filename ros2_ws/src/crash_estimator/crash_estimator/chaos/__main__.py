@@ -13,7 +13,7 @@ from .case import case_of
 from .judge import FAILED
 from .page import page
 from .plan import MEMBERS, plan
-from .results import RESULTS, references, rows
+from .results import RESULTS, kept, references, rows
 
 RUNS, SEED = 200, 1
 FIRST_START = "demo/frontal/busy+cold_caches"
@@ -25,6 +25,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=SEED, metavar="S", help="of the faults, default %(default)s")
     parser.add_argument("--only", metavar="NAME", help="only cases with this in their names, such as stop:replay")
     parser.add_argument("--case", metavar="NAME", help="only this one; no page is written")
+    parser.add_argument("--add", action="store_true", help="keep the results that are in --out: the page is of all")
     parser.add_argument("--first-start", action="store_true", help="only the first start of all, on a busy machine")
     parser.add_argument("--jobs", type=int, default=2, metavar="J", help="runs side by side, default %(default)s")
     parser.add_argument("--uses", nargs="+", choices=[*MEMBERS], default=[*MEMBERS], help="default: all")
@@ -41,17 +42,19 @@ def _run(arguments: argparse.Namespace) -> int:
         drawn = plan(arguments.seed, arguments.runs, arguments.uses)
         cases = [case for case in drawn if (arguments.only or "") in case.name]
     arguments.out.mkdir(parents=True, exist_ok=True)
-    (arguments.out / RESULTS).unlink(missing_ok=True)
+    results = arguments.out / RESULTS
+    if not arguments.add:
+        results.unlink(missing_ok=True)
     found = references(cases, arguments.out, arguments.jobs)
     done = []
-    for row in rows(cases, arguments.out, found, arguments.jobs):
+    for row in rows(cases, results, found, arguments.jobs, arguments.seed):
         done.append(row)
         what = f"{row['verdict']}, {row['seconds']:g} s {row['why']}"
         say(f"{len(done)}/{len(cases)} {row['case']}: {what}")
     counts = Counter(row["verdict"] for row in done)
     say(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
     if not (name or arguments.only):
-        write_markdown(arguments.to, [page(done, arguments.seed)])
+        write_markdown(arguments.to, [page(kept(results))])
     return 1 if counts[FAILED] else 0
 
 
