@@ -77,7 +77,7 @@ class ViewerNode(Node):
         known = cache(partial(structure_named, models))
         warn = self.get_logger().warning
         self.recorder = Recorder(sinks, tuple(self.names), say=warn, structure_of=known)
-        if sinks.port != port:
+        if port not in (0, sinks.port):  # 0 asks for any
             log(f"port {port} is in use, taking {sinks.port}")
         self.window: subprocess.Popen | None = None
         self.invitation = f"look at it live with: rerun --connect {sinks.url}"
