@@ -110,12 +110,13 @@ def children_of(parent: int) -> list[int]:
 
 
 def largest_written(process: int) -> int:
-    """Bytes of the largest file that a process has open for writing."""
+    """Bytes of the largest file on a disk that a process has open for writing: the middleware's are in memory."""
     largest = 0
     for handle in Path(f"/proc/{process}/fd").glob("*"):
         with suppress(OSError):
             flags = Path(f"/proc/{process}/fdinfo/{handle.name}").read_text().split("flags:")[1].split()[0]
-            if int(flags, 8) & os.O_ACCMODE and handle.is_file():
+            on_disk = handle.is_file() and not handle.readlink().is_relative_to("/dev")
+            if on_disk and int(flags, 8) & os.O_ACCMODE:
                 largest = max(largest, handle.stat().st_size)
     return largest
 
