@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Protocol
 
 from .case import FINISHED, FULL_DISK, HANG_UP, KILL, LASTING, PLAYED, RESTART, STOP, Fault
-from .members import Member, children_of, largest_written, send
+from .members import Member, children_of, furthest_written, send
 
-ROOM = 65536
+ROOM = 16384
 """Bytes that fit into any file though the disk is full: what a process says goes into one too."""
 
 
@@ -65,7 +65,7 @@ class Faults:
             come_back = lambda: send(process, signal.SIGCONT)
         elif fault.kind == FULL_DISK:
             for one in [process, *children_of(process)]:
-                full = max(largest_written(one), ROOM)
+                full = max(furthest_written(one), ROOM)
                 resource.prlimit(one, resource.RLIMIT_FSIZE, (full, full))
         else:
             send(process, signal.SIGKILL)

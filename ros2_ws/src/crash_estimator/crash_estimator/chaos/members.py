@@ -109,16 +109,16 @@ def children_of(parent: int) -> list[int]:
     return found + [grandchild for child in found for grandchild in children_of(child)]
 
 
-def largest_written(process: int) -> int:
-    """Bytes of the largest file on a disk that a process has open for writing: the middleware's are in memory."""
-    largest = 0
+def furthest_written(process: int) -> int:
+    """Bytes up to which a process has written its longest file, which may have room reserved behind them."""
+    furthest = 0
     for handle in Path(f"/proc/{process}/fd").glob("*"):
         with suppress(OSError):
-            flags = Path(f"/proc/{process}/fdinfo/{handle.name}").read_text().split("flags:")[1].split()[0]
+            position, flags = Path(f"/proc/{process}/fdinfo/{handle.name}").read_text().split()[1:4:2]
             on_disk = handle.is_file() and not handle.readlink().is_relative_to("/dev")
             if on_disk and int(flags, 8) & os.O_ACCMODE:
-                largest = max(largest, handle.stat().st_size)
-    return largest
+                furthest = max(furthest, int(position))
+    return furthest
 
 
 def command_line(process: int) -> str:
