@@ -52,6 +52,13 @@ def test_verdict(verdict, left):
     assert judged(left, REFERENCE).verdict == verdict
 
 
+@pytest.mark.parametrize("status, says, verdict", [(1, True, SAID), (1, False, FAILED), (0, True, FAILED)])
+def test_a_file_may_say_it_itself(status, says, verdict):
+    ended = [Ended("replay", 0, ""), Ended("record", status, "", killed=True)]
+    left = Outcome(ended, {"recording": Product("record", CUT, says)})
+    assert judged(left, {"recording": WHOLE}).verdict == verdict
+
+
 def test_what_is_amiss_is_counted():
     assert judged(outcome(OTHER), REFERENCE).why == "nobody says it: estimates 1 of 3 other than undisturbed"
 

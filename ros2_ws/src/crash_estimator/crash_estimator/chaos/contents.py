@@ -43,6 +43,12 @@ def recorded(file: Path) -> dict[str, str]:
     return found
 
 
+def says_incomplete(file: Path) -> bool:
+    """Whether a recording says of itself that something is missing."""
+    with file.open("rb") as stream:
+        return any(record.metadata.get("complete") == "false" for record in make_reader(stream).iter_metadata())
+
+
 def _by_number(message: Samples | Parameters, *columns: array) -> Iterator[tuple[int, str]]:
     count = len(message.time_ns)
     rows = [np.asarray(column).reshape(count, -1) for column in columns]

@@ -33,6 +33,7 @@ class Ended(NamedTuple):
 class Product(NamedTuple):
     owner: str  # name of the member whose it is
     content: Content
+    says: bool = False  # in itself, that it is incomplete
 
 
 class Outcome(NamedTuple):
@@ -95,6 +96,8 @@ def _lacks(content: Content, reference: Content) -> str:
 def _is_said(outcome: Outcome, owner: str) -> bool:
     """Whether a member with a status that is not 0 says that the product of `owner` is incomplete."""
     for ended in outcome.ended:
+        if ended.name == owner and ended.status and any(p.owner == owner and p.says for p in outcome.products.values()):
+            return True  # its terminal may be closed
         if ended.name == owner and ended.killed and (ended.had_all or not outcome.sent):
             return True  # nobody else can know: its own terminal shows how it ended
         if not ended.status or ended.killed:

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from .case import RESTART, Case
-from .contents import recorded
+from .contents import recorded, says_incomplete
 from .judge import FAULTY, Product
 from .members import Member, node_command
 from .observer import Observer
@@ -89,12 +89,14 @@ class Terminals:
         made = {f"estimates of {name}": Product(name, said) for name, said in heard(self.observer).items()}
         if any(member.name == DIAGNOSIS for member in self.members):
             made["diagnosis"] = Product(DIAGNOSIS, answers(self.observer))
-        made["recording"] = Product(RECORD, self._recorded())
+        made["recording"] = self._recorded()
         return made
 
-    def _recorded(self) -> dict[str, str]:
+    def _recorded(self) -> Product:
+        if not self.recording.exists():
+            return Product(RECORD, {})
         try:
-            return recorded(self.recording) if self.recording.exists() else {}
+            return Product(RECORD, recorded(self.recording), says_incomplete(self.recording))
         except Exception as error:
             raise Broken(f"{RECORDING} does not open with mcap's reader: {error!r}") from error
 
