@@ -10,26 +10,29 @@ from .judge import COMPLETE, FAILED, SAID
 
 HEAD = """# Faults on purpose
 
-`make chaos` disturbs the project's uses while a short recording is replayed: processes are killed, stopped, started again,
-their terminals closed, disks, cores and caches taken away. A run must end **complete**, with every estimate, every answer
-and the recording equal to those of an undisturbed run to the last bit and every exit status 0, or incomplete, **said** in a
-line that names who lacks what, with an exit status that is not 0. All else is FAILED: other numbers, silence, a traceback, a
-file that mcap's reader does not open, a wait that does not end.
+`make chaos` disturbs the project's uses while a short recording is replayed: processes are killed, stopped,
+started again, their terminals closed, disks, cores and caches taken away. A run must end **complete**, with
+every estimate, every answer and the recording equal to those of an undisturbed run to the last bit and every
+exit status 0, or incomplete, **said** in a line that names who lacks what, with an exit status that is not 0.
+All else is FAILED: other numbers, silence, a traceback, a file that mcap's reader does not open, a wait that
+does not end.
 
-The uses: `estimators`, a replay, two estimators and `record` in terminals of their own; `terminals`, these and the
-diagnosis; `shown`, the estimators and the viewer; `demo`, the demonstration without its viewer; `demo_shown`, with it. What
-the viewer writes is judged by its exit status alone. Nothing here starts `live.launch.py`: launch is not among the wheels, its
-tests run it against stand-ins. A full disk is a limit on the size of what a process writes, from that moment on.
+The uses: `estimators`, a replay, two estimators and `record` in terminals of their own; `terminals`, these and
+the diagnosis; `shown`, the estimators and the viewer; `demo`, the demonstration without its viewer;
+`demo_shown`, with it. What the viewer writes is judged by its exit status alone. Nothing here starts
+`live.launch.py`: launch is not among the wheels, its tests run it against stand-ins. A full disk is a limit on
+the size of what a process writes, from that moment on.
 
-A case's name is all that decides it: use, recording, and each fault as `kind:member@moment:duration`, the moment in s since
-the member's start, in % of the samples sent, or in s after the last sample. `make chaos ARGS="--case NAME"` does it again."""
+A case's name is all that decides it: use, recording, and each fault as `kind:member@moment:duration`, the
+moment in s since the member's start, in % of the samples sent, or in s after the last sample. `make chaos
+ARGS="--case NAME"` does it again."""
 
 
 def page(rows: Sequence[dict]) -> str:
     runs = Counter((row["seed"], row["code"]) for row in rows)
-    counted = "; ".join(f"seed {seed}, code {code}: {count} runs" for (seed, code), count in sorted(runs.items()))
+    counted = "Of them: " + "; ".join(f"seed {seed}, code {code}: {count} runs" for (seed, code), count in sorted(runs.items()))
     idle = sum(bool(row["not carried out"]) for row in rows)
-    parts = [HEAD, f"{counted}. In all {len(rows)} runs: {_counts(rows)}."]
+    parts = [HEAD, f"In all {len(rows)} runs: {_counts(rows)}.\n\n{counted}."]
     parts += [f"In {idle} of them a fault found nobody to befall any more: the run was over before its moment."] * bool(idle)
     parts += [_table(rows), _failed(rows)]
     return "\n\n".join(part for part in parts if part) + "\n"
