@@ -30,10 +30,14 @@ ARGS="--case NAME"` does it again."""
 
 def page(rows: Sequence[dict]) -> str:
     runs = Counter((row["seed"], row["code"]) for row in rows)
-    counted = "Of them: " + "; ".join(f"seed {seed}, code {code}: {count} runs" for (seed, code), count in sorted(runs.items()))
+    counted = "Of them: " + "; ".join(
+        f"seed {seed}, code {code}: {count} runs" for (seed, code), count in sorted(runs.items())
+    )
     idle = sum(bool(row["not carried out"]) for row in rows)
     parts = [HEAD, f"In all {len(rows)} runs: {_counts(rows)}.\n\n{counted}."]
-    parts += [f"In {idle} of them a fault found nobody to befall any more: the run was over before its moment."] * bool(idle)
+    parts += [f"In {idle} of them a fault found nobody to befall any more: the run was over before its moment."] * bool(
+        idle
+    )
     parts += [_table(rows), _failed(rows)]
     return "\n\n".join(part for part in parts if part) + "\n"
 
