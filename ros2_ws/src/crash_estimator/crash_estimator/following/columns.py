@@ -2,7 +2,7 @@
 they are, or from `Estimate`s."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from math import isfinite
+from math import isfinite, isqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -132,7 +132,7 @@ class Parts(Mapping):
     def __getitem__(self, field: str) -> np.ndarray:
         part = self.table[:, self.places["parameters" if field == "value" else field]]
         if field == "covariance":
-            side = self.table[0, self.places["parameters"]].size
+            side = isqrt(part.shape[1])
             return part.reshape(-1, side, side)
         return part.astype(np.uint8) if field in ("status", "state") else part
 
