@@ -226,7 +226,12 @@ def recipe(*arguments: str) -> list[str]:
     ],
 )
 def test_make_runs(arguments, command):
-    assert recipe(*arguments) == [command]
+    assert recipe(*arguments)[-1] == command
+
+
+def test_the_demonstration_gets_what_its_picture_takes_where_there_is_no_screen():
+    first, _ = recipe("demo")
+    assert first.startswith('[ -n "$DISPLAY$WAYLAND_DISPLAY" ] ||') and "tools/screenshot-libs" in first
 
 
 TWO_PROCESSES = "-p _hypothesis_pytestplugin -p xdist.plugin -n 2 --dist loadfile"

@@ -32,7 +32,7 @@ def test_a_signal_ends_an_idle_node_at_once(number):
         os.kill(os.getpid(), number)
 
     Timer(0.5, send).start()
-    assert run(lambda: Node("idle"), (), close=closed.append) == 0
+    assert run(lambda: Node("idle"), close=closed.append) == 0
     assert len(closed) == 1
     assert 0.0 <= time.monotonic() - sent[0] < 3.0  # it has nothing to do and no event comes: else it never ends
 
@@ -53,7 +53,7 @@ def test_a_signal_in_a_callback_and_while_the_node_is_made_takes_nothing_away(nu
         os.kill(os.getpid(), number)
         done.append(node.context.ok())
 
-    assert run(make, ()) == 0
+    assert run(make) == 0
     assert done[0] == "made" and all(done[1:]) and len(done) > 1
 
 
