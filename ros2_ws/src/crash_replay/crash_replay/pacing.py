@@ -151,6 +151,7 @@ class Pacing:
         limit = time.perf_counter() + (DISCOVERY if self.stopped else LAST_ACKNOWLEDGEMENT)
         player, stopped, self.stopped = self.player, self.stopped, False  # a signal from now on ends the waiting here
         while not (arrived := self.outlet.all_have_arrived()) and not self.stopped and time.perf_counter() < limit:
+            self._send_state_if_due()
             time.sleep(0.001)
         if not stopped:
             self._wait_for_listeners(timeout)

@@ -16,7 +16,7 @@ from ament_index_python.packages import get_package_prefix
 
 from crash_replay.output import named
 
-POLITE = 12.0
+POLITE = 16.0
 """s that a process has to end by itself: the viewer writes its file's end."""
 LOG_HEAD = re.compile(r"^\[(?P<level>\w+)\] \[[\d.]+\] \[[^]]+\]: ")
 """[INFO] [1763000000.123] [replay]: in front of what a node says."""
