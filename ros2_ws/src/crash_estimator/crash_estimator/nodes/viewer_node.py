@@ -44,7 +44,7 @@ SETTLED = 0.3
 """s for which all publishers must have been there: they hear of their subscriber a little later than it of them."""
 
 HURRIED, PATIENT = 9.0, 60.0
-"""s to end the file: where a signal has come before the end, who sent it may not wait long; `launch` kills after 10 s."""
+"""s to end the file: where a signal has come before the end, who sent it waits not for long (`launch`: 10 s)."""
 
 
 PARAMETERS = {
