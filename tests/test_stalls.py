@@ -54,6 +54,16 @@ def numbers(messages) -> list[int]:
     return [message.number + k for message in messages for k in range(len(message.time_ns))]
 
 
+def assert_whole(stage, victim: subprocess.Popen, whole: np.ndarray) -> None:
+    """The victim has said the right parameters after every sample, and knows that it has."""
+    messages = sorted(stage.heard["victim"]["parameters"], key=lambda message: message.number)
+    assert numbers(messages) == list(range(len(whole)))
+    assert_array_equal(joined(messages, "value")[:, : whole.shape[1]], whole)
+    victim.send_signal(signal.SIGINT)
+    stage.spin_until(lambda: victim.poll() is not None, "it has ended")
+    assert victim.returncode == 0
+
+
 def test_who_was_stopped_until_the_last_sample_was_long_sent_has_all_of_them_in_the_end(stage, whole):
     stage.listen_to_samples()
     victim, replay = victim_and_replay(stage)
@@ -64,12 +74,7 @@ def test_who_was_stopped_until_the_last_sample_was_long_sent_has_all_of_them_in_
     status, said = ended(stage, replay)
     assert status == 0, said
     assert re.search(r"/victim (stopped|silent) for \d+ s", said) and "incomplete" not in said, said
-    messages = sorted(stage.heard["victim"]["parameters"], key=lambda message: message.number)
-    assert numbers(messages) == list(range(len(whole)))
-    assert_array_equal(joined(messages, "value")[:, : whole.shape[1]], whole)
-    victim.send_signal(signal.SIGINT)
-    stage.spin_until(lambda: victim.poll() is not None, "it has ended")
-    assert victim.returncode == 0
+    assert_whole(stage, victim, whole)
 
 
 def test_who_is_killed_is_named_and_the_status_is_1(stage):
@@ -104,12 +109,7 @@ def test_a_replay_that_was_stopped_goes_on_and_nothing_is_missing(stage, whole):
     replay.send_signal(signal.SIGCONT)
     status, said = ended(stage, replay)
     assert status == 0, said
-    messages = sorted(stage.heard["victim"]["parameters"], key=lambda message: message.number)
-    assert numbers(messages) == list(range(len(whole)))
-    assert_array_equal(joined(messages, "value")[:, : whole.shape[1]], whole)
-    victim.send_signal(signal.SIGINT)
-    stage.spin_until(lambda: victim.poll() is not None, "it has ended")
-    assert victim.returncode == 0
+    assert_whole(stage, victim, whole)
 
 
 def test_a_diagnosis_that_was_stopped_gives_the_same_answer(stage):
