@@ -68,3 +68,29 @@ def test_every_main_is_guarded():
     mains = [file for file in PACKAGES.rglob("*.py") if file.name not in unguarded and "def main(" in file.read_text()]
     assert len(mains) > 10
     assert [file.name for file in mains if not re.search(r"guarded\(|return run\(", file.read_text())] == []
+
+
+DIAGNOSIS = PACKAGES / "crash_estimator" / "crash_estimator" / "core" / "diagnosis"
+FLOORS = (
+    "observation", "parameterization", "mechanics", "output_error", "residuals", "selection", "report", "online",
+)  # fmt: skip
+
+
+def test_the_diagnosis_imports_go_one_way():
+    """A package of the diagnosis imports from those before it alone."""
+    assert {path.name for path in DIAGNOSIS.iterdir() if (path / "__init__.py").exists()} == set(FLOORS)
+    upward = [
+        f"{file.relative_to(DIAGNOSIS)} imports {other}"
+        for floor, name in enumerate(FLOORS)
+        for file in (DIAGNOSIS / name).glob("*.py")
+        for other in re.findall(r"^\s*from \.\.(\w+)", file.read_text(), re.MULTILINE)
+        if other not in FLOORS[:floor]
+    ]
+    assert upward == []
+
+
+def test_only_the_public_face_of_the_diagnosis_is_imported_from_outside():
+    files = [file for file in PACKAGES.rglob("*.py") if DIAGNOSIS not in file.parents]
+    inside = re.compile(r"^(from|import) \S*\bdiagnosis\.\w", re.MULTILINE)  # indented ones are for type checkers alone
+    deep = [str(file) for file in files if inside.search(file.read_text())]
+    assert deep == []

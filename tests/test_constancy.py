@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crash_estimator.core.diagnosis.constancy import Drift, drift_of
-from crash_estimator.core.diagnosis.diagnosis import diagnose
-from crash_estimator.core.diagnosis.model import fit_model
-from crash_estimator.core.diagnosis.records import make_record
-from crash_estimator.core.diagnosis.scales import make_scales
+from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
+from crash_estimator.core.diagnosis.report.diagnosis import diagnose
+from crash_estimator.core.diagnosis.residuals.score_test import Drift, drift_of
+from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
 from crash_estimator.model_file import ModelFile
 from crash_replay.synthetic.hidden.cases import HiddenCase, draw_case
 from crash_replay.synthetic.hidden.specimen import Specimen
@@ -21,9 +21,9 @@ DURATION = 0.1
 def drift(drawn: HiddenCase) -> tuple[Drift, bool]:
     """Of the model as given, fitted to recordings at two speeds; and whether its residual looks white."""
     structure = ModelFile.model_validate(dict(drawn.specimen.model)).structure()
-    records = [make_record(structure, drawn.record(speed, 1.0)[0]) for speed in (0.75, 1.1)]
-    model = fit_model(structure, records, make_scales(structure, records, 36), ())
-    return drift_of(model.fit, records), model.left.whiteness.white
+    records = [observe(structure, drawn.record(speed, 1.0)[0]) for speed in (0.75, 1.1)]
+    model = fit_model(measure_magnitudes(structure, records, 36), records, ())
+    return drift_of(model.fit), model.white
 
 
 def test_a_right_model_is_constant():
@@ -71,6 +71,6 @@ def test_two_effects_that_mimic_a_growing_mass_do_not_explain_it():
     drawn = draw_case("impactor", ("changing_mass",), 700111)
     structure = ModelFile.model_validate(dict(drawn.specimen.model)).structure()
     found = diagnose(structure, [drawn.record(speed, 2.0)[0] for speed in (0.75, 1.1)])
-    assert len(found.steps) == 2 and found.models[-1].left.whiteness.white
+    assert len(found.steps) == 2 and found.models[-1].white
     assert found.verdict == "unexplained"
     assert "the mass of impactor" in found.text and "varies with time" in found.text

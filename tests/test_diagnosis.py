@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from crash_estimator.core.diagnosis.candidates import candidates
-from crash_estimator.core.diagnosis.diagnosis import Diagnosis, diagnose
-from crash_estimator.core.diagnosis.model import fit_model
-from crash_estimator.core.diagnosis.noise import sensor_noise
-from crash_estimator.core.diagnosis.normal import may_diverge
-from crash_estimator.core.diagnosis.records import make_record
-from crash_estimator.core.diagnosis.scales import make_scales
-from crash_estimator.core.diagnosis.screening import screen
-from crash_estimator.core.diagnosis.whiteness import whiteness
+from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.diagnosis.observation.sensor_noise import sensor_noise
+from crash_estimator.core.diagnosis.output_error.normal_equations import may_diverge
+from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
+from crash_estimator.core.diagnosis.report.diagnosis import Diagnosis, diagnose
+from crash_estimator.core.diagnosis.residuals.band_test import band_test
+from crash_estimator.core.diagnosis.selection.candidates import candidates
+from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
+from crash_estimator.core.diagnosis.selection.score_screening import screen
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.structure import EffectSpec, ModelError, Structure
 from crash_estimator.model_file import ModelFile
@@ -83,14 +83,14 @@ def test_a_delayed_channel_is_at_rest_until_the_impact_has_reached_it():
 
 def test_along_a_motion_without_bounds_nothing_is_screened():
     model, recordings, _ = case("impactor", "viscous_damping")
-    records = [make_record(model, recording) for recording in recordings]
-    scales = make_scales(model, records, 12)
-    fitted = fit_model(model, records, scales, ()).fit
-    every = candidates(model, scales, EFFECTS, ())
-    assert screen(records, scales, (), every, None, fitted)
+    records = [observe(model, recording) for recording in recordings]
+    magnitudes = measure_magnitudes(model, records, 12)
+    fitted = fit_model(magnitudes, records, ()).fit
+    every = candidates(magnitudes, EFFECTS)
+    assert screen(magnitudes, records, (), every, None, fitted)
     lost = fitted._replace(trajectories=tuple(t._replace(a=np.full_like(t.a, np.inf)) for t in fitted.trajectories))
     with may_diverge:
-        assert screen(records, scales, (), every, None, lost) == []
+        assert screen(magnitudes, records, (), every, None, lost) == []
 
 
 @pytest.mark.parametrize("structure", ["impactor", "single", "frontal"])
@@ -189,6 +189,6 @@ def test_white_noise_is_white_and_a_small_wave_in_it_is_not():
     white = rng.normal(size=(1000, 2))
     wave = white + np.outer(0.4 * np.sin(2.0 * np.pi * 40.0 * 1e-4 * np.arange(1000)), [0.0, 1.0])
     samples, period = [np.full(2, 300.0)], [1e-4]
-    assert whiteness([white], samples, period).white
-    found = whiteness([wave], samples, period)
+    assert band_test([white], samples, period).white
+    found = band_test([wave], samples, period)
     assert not found.white and found.worst.output == 1 and found.worst.low < 40.0 < found.worst.high

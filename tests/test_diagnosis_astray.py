@@ -5,14 +5,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from crash_estimator.core.diagnosis.assess import free_run
-from crash_estimator.core.diagnosis.diagnosis import diagnose
-from crash_estimator.core.diagnosis.helpful import helpful
-from crash_estimator.core.diagnosis.model import fit_model
-from crash_estimator.core.diagnosis.records import make_record
-from crash_estimator.core.diagnosis.rounds import better, fitted_on, one_round
-from crash_estimator.core.diagnosis.scales import make_scales
-from crash_estimator.core.diagnosis.search import search
+from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.diagnosis.output_error.continuation import FROM_SIMULATION
+from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
+from crash_estimator.core.diagnosis.report.diagnosis import diagnose
+from crash_estimator.core.diagnosis.residuals.residuals import free_run
+from crash_estimator.core.diagnosis.selection.acceptance import better
+from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
+from crash_estimator.core.diagnosis.selection.forward_selection import forward_selection
+from crash_estimator.core.diagnosis.selection.pruning import up_to_the_least_error
+from crash_estimator.core.diagnosis.selection.selection_step import selection_step
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.model_file import ModelFile
 from crash_replay.synthetic.hidden.cases import draw_case
@@ -28,18 +30,18 @@ def drawn(structure: str, effect: str, seed: int, noise: float):
 
 @cache
 def fitted(*case):
-    """Records, scales and the model as given."""
+    """Magnitudes and the model as given."""
     structure, recording = drawn(*case)
-    records = [make_record(structure, recording)]
-    scales = make_scales(structure, records, 36)
-    return records, scales, fit_model(structure, records, scales, ())
+    records = [observe(structure, recording)]
+    magnitudes = measure_magnitudes(structure, records, 36)
+    return magnitudes, fit_model(magnitudes, records, ())
 
 
 @cache
 def searched():
-    """Rounds and the last model of a case that the vocabulary cannot explain."""
-    records, scales, _ = fitted(*ROTATING_IMPACTOR)
-    return search(records, scales, EFFECTS)
+    """Steps and the last model of a case that the vocabulary cannot explain."""
+    magnitudes, _ = fitted(*ROTATING_IMPACTOR)
+    return forward_selection(magnitudes, EFFECTS)
 
 
 def test_what_a_model_leaves_as_given_is_what_its_own_simulation_leaves():
@@ -52,21 +54,24 @@ def test_what_a_model_leaves_as_given_is_what_its_own_simulation_leaves():
 
 def test_a_fit_is_no_better_than_the_motion_that_it_has_ended_in():
     """Evidence counts a motion's defect as mended: a motion that leaves more is no better one, whatever that says."""
-    _, _, model = fitted(*ROTATING_IMPACTOR)
+    _, model = fitted(*ROTATING_IMPACTOR)
     claims = model.fit._replace(evidence=model.fit.evidence + 100.0)
-    closer, further = (model.left._replace(cost=share * model.left.cost) for share in (0.9, 1.1))
-    assert better(model._replace(fit=claims, left=closer), model)
-    assert not better(model._replace(fit=claims, left=further), model)
-    assert not better(model._replace(left=closer), model)
+    closer, further = (
+        model.residuals._replace(mean_square=share * model.residuals.mean_square) for share in (0.9, 1.1)
+    )
+    assert better(model._replace(fit=claims, residuals=closer), model)
+    assert not better(model._replace(fit=claims, residuals=further), model)
+    assert not better(model._replace(residuals=closer), model)
 
 
 def test_in_a_larger_noise_a_fit_does_not_end_further_from_what_was_measured_than_one_that_starts_closer():
     """From the measured motion the fit of this door goes astray; from the fit in the sensors' noise it does not."""
-    records, scales, model = fitted(*ROTATING_DOOR)
-    before = one_round(records, scales, EFFECTS, model).before
-    assert before.records[0].mix is not None
-    assert not better(fitted_on(before, model.fit), before)
-    assert before.left.rms < 1.1 * free_run(model.fit, records).rms
+    magnitudes, model = fitted(*ROTATING_DOOR)
+    before = selection_step(magnitudes, EFFECTS, model).before
+    assert before.fit.problem.noise_is_inflated
+    start = before.fit.problem.narrowed(model.fit.layout, model.fit.point)
+    assert not better(before.refitted(start, FROM_SIMULATION), before)
+    assert before.residuals.rms < 1.1 * free_run(model.fit).rms
 
 
 def test_the_structure_with_what_was_added_holds_the_coefficients_that_are_told():
@@ -80,30 +85,33 @@ def test_the_structure_with_what_was_added_holds_the_coefficients_that_are_told(
 
 
 def test_steps_after_the_least_error_are_not_told():
-    rounds, final = searched()
-    assert not final.left.whiteness.white and len(final.additions) == 2
-    models = [round_.before for round_ in rounds[:2]] + [final]
-    assert models[0].left.rms > models[1].left.rms > models[2].left.rms
-    assert helpful(rounds, final, 0) == (rounds, final)
+    path, final = searched()
+    assert not final.white and len(final.additions) == 2
+    models = [step.before for step in path[:2]] + [final]
+    assert models[0].residuals.rms > models[1].residuals.rms > models[2].residuals.rms
+    assert up_to_the_least_error(path, final, 0) == (path, final)
 
     def with_errors(*errors):
-        made = [model._replace(left=model.left._replace(rms=rms)) for model, rms in zip(models, errors)]
-        again = [round_._replace(before=model) for round_, model in zip(rounds, made)]
-        return [*again, *(round_._replace(before=made[2]) for round_ in rounds[2:])], made
+        made = [
+            model._replace(residuals=model.residuals._replace(rms=rms))
+            for model, rms in zip(models, errors, strict=True)
+        ]
+        again = [step._replace(before=model) for step, model in zip(path, made, strict=False)]
+        return [*again, *(step._replace(before=made[2]) for step in path[2:])], made
 
     for errors, kept in (((3.0, 4.0, 3.5), 0), ((3.0, 2.0, 2.0), 1), ((3.0, 2.0, 1.0), 2), ((3.0, 4.0, 1.0), 2)):
         told, made = with_errors(*errors)
-        cut, last = helpful(told, made[2], 0)
+        cut, last = up_to_the_least_error(told, made[2], 0)
         assert last is made[kept]
         assert cut == (told if kept == 2 else told[: kept + 1])
 
 
 def test_an_effect_that_is_found_to_be_nothing_is_not_told():
-    rounds, final = searched()
-    best, *others = rounds[1].tried
-    place = next(p for p in best.fit.layout.places if p.addition.key == best.addition.key)
-    theta = np.where(np.arange(len(best.fit.theta)) == place.coefficient, 0.0, best.fit.theta)
+    path, final = searched()
+    best, *others = path[1].candidates
+    term = best.fit.layout.term(best.addition)
+    theta = np.where(np.arange(len(best.fit.theta)) == term.coefficient, 0.0, best.fit.theta)
     nothing = best._replace(fit=best.fit._replace(theta=theta))
-    told = [rounds[0], rounds[1]._replace(tried=[nothing, *others]), *rounds[2:]]
-    cut, last = helpful(told, final, 0)
+    told = [path[0], path[1]._replace(candidates=[nothing, *others]), *path[2:]]
+    cut, last = up_to_the_least_error(told, final, 0)
     assert last is told[1].before and cut == told[:2]

@@ -11,7 +11,7 @@ import yaml
 
 from crash_estimator.cli import diagnose as command
 from crash_estimator.cli import estimate
-from crash_estimator.core.diagnosis.diagnosis import Diagnosis, diagnose
+from crash_estimator.core.diagnosis.report.diagnosis import Diagnosis, diagnose
 from crash_estimator.diagnosis_doubt import doubt
 from crash_estimator.model_file import load_model, model_path
 from crash_replay.bag import read_bag
@@ -77,13 +77,13 @@ def test_an_effect_as_large_as_is_admitted_is_doubted(sign):
     one = found("hidden_effect", HIDDEN)
     last = one.models[-1]
     layout, theta = last.fit.layout, sign * last.fit.theta
-    (place,) = layout.places
+    (place,) = layout.terms
     limits = [np.full(layout.size, -np.inf), np.full(layout.size, np.inf)]
 
     def limited(share: float) -> str:
         limits[sign > 0.0][place.coefficient] = theta[place.coefficient] * share
         prior = layout.prior._replace(low=limits[0], high=limits[1])
-        fitted = last.fit._replace(theta=theta, layout=layout._replace(prior=prior))
+        fitted = last.fit._replace(theta=theta, problem=last.fit.problem._replace(layout=layout._replace(prior=prior)))
         return doubt(replace(one, models=(*one.models[:-1], last._replace(fit=fitted))))
 
     assert limited(1.1) == ""

@@ -8,19 +8,19 @@ import pytest
 from helpers_diagnosis import hidden_case, so_far
 from numpy.testing import assert_allclose, assert_array_equal
 
-from crash_estimator.core.diagnosis import live, live_candidates
-from crash_estimator.core.diagnosis.answer import ranking_of
-from crash_estimator.core.diagnosis.coarse import MOST_STEPS, coarsened
-from crash_estimator.core.diagnosis.diagnosis import diagnose
-from crash_estimator.core.diagnosis.fit import COARSE, CONVERGED
-from crash_estimator.core.diagnosis.layout import Addition
-from crash_estimator.core.diagnosis.live import LiveDiagnosis
-from crash_estimator.core.diagnosis.live_answer import LiveAnswer, final_answer
-from crash_estimator.core.diagnosis.live_candidates import ITERATIONS_ON
-from crash_estimator.core.diagnosis.records import make_record
-from crash_estimator.core.diagnosis.rounds import Round
-from crash_estimator.core.diagnosis.screening import Screened
-from crash_estimator.core.diagnosis.trying import Tried
+from crash_estimator.core.diagnosis.observation.bin_means import MOST_STEPS, in_bins
+from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.diagnosis.online import candidate_turns, online_diagnosis
+from crash_estimator.core.diagnosis.online.candidate_turns import ITERATIONS_ON
+from crash_estimator.core.diagnosis.online.online_answer import OnlineAnswer, final_answer
+from crash_estimator.core.diagnosis.online.online_diagnosis import OnlineDiagnosis
+from crash_estimator.core.diagnosis.output_error.gauss_newton import COARSE, CONVERGED
+from crash_estimator.core.diagnosis.parameterization.layout import Addition
+from crash_estimator.core.diagnosis.report.diagnosis import diagnose
+from crash_estimator.core.diagnosis.report.ranking import ranking_of
+from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
+from crash_estimator.core.diagnosis.selection.score_screening import Screened
+from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.kept import Kept, Rows
 from crash_estimator.nodes.diagnosis_story import Told, story
@@ -42,9 +42,9 @@ HIDDEN = [
 ]
 
 
-def answers(structure, recording: Recording, **settings) -> list[LiveAnswer]:
+def answers(structure, recording: Recording, **settings) -> list[OnlineAnswer]:
     """All that is said while the recording is replayed."""
-    diagnosis = LiveDiagnosis(structure, recording.test, budget=np.inf, **settings)
+    diagnosis = OnlineDiagnosis(structure, recording.test, budget=np.inf, **settings)
     state, said = diagnosis.init(), []
     for end in np.arange(EVERY, recording.time[-1] + EVERY, EVERY):
         state, answer = diagnosis.update(state, so_far(recording, end))
@@ -115,7 +115,7 @@ def test_a_misfit_is_told_before_the_test_is_as_long_as_its_window(damped, end):
     shaking = 500.0 * np.where(np.arange(len(recording.values)) % 40 < 20, 1.0, -1.0)[:, None]
     at_50_khz = replace(recording, time_ns=recording.time_ns // 5, values=recording.values + shaking)
     shaken = so_far(at_50_khz, end)
-    diagnosis = LiveDiagnosis(model, shaken.test, budget=np.inf)
+    diagnosis = OnlineDiagnosis(model, shaken.test, budget=np.inf)
     _, answer = diagnosis.update(diagnosis.init(), shaken)
     assert answer.misfit and all(0.0 <= window.start <= window.end <= end for window in answer.misfit)
 
@@ -132,12 +132,12 @@ def test_the_last_one_is_the_offline_answer_itself(damped):
 
 def test_an_update_fits_four_models_at_most(damped, monkeypatch):
     fits = []
-    fit = live.fit
-    for module in (live, live_candidates):
+    fit = online_diagnosis.fit
+    for module in (online_diagnosis, candidate_turns):
         monkeypatch.setattr(module, "fit", lambda *a, **k: fits.append(fit(*a, **k)) or fits[-1])
     _, model, recording = hidden_case("dummy", "coulomb_friction", 8111)
     counts, iterations = [], []
-    diagnosis = LiveDiagnosis(model, recording.test, budget=np.inf)
+    diagnosis = OnlineDiagnosis(model, recording.test, budget=np.inf)
     state = diagnosis.init()
     for end in (0.03, 0.04, 0.05, 0.06, 0.07, 0.08):
         fits.clear()
@@ -145,9 +145,9 @@ def test_an_update_fits_four_models_at_most(damped, monkeypatch):
         counts.append(len(fits))
         iterations.append(max(one.iterations for one in fits))
     # steps that were too long are halved, and count
-    assert max(counts) == 4 and max(iterations) <= 2 * live.MOST_ITERATIONS
+    assert max(counts) == 4 and max(iterations) <= 2 * online_diagnosis.MOST_ITERATIONS
     fits.clear()
-    hurried = LiveDiagnosis(model, recording.test, budget=0.0)
+    hurried = OnlineDiagnosis(model, recording.test, budget=0.0)
     state, _ = hurried.update(state, so_far(recording, 0.085))
     hurried.update(state, recording)
     assert len(fits) <= 2 * 3, "out of time, it leaves a leader to the next update"
@@ -156,10 +156,10 @@ def test_an_update_fits_four_models_at_most(damped, monkeypatch):
 @pytest.mark.parametrize("structure, effect, seed", [("side", "", 8120), ("impactor", "quadratic_damping", 8103)])
 def test_a_fit_that_goes_on_from_the_last_update_ends_where_one_begun_afresh_does(structure, effect, seed, monkeypatch):
     fits = []
-    fit = live.fit
-    monkeypatch.setattr(live, "fit", lambda *a, **k: fits.append(fit(*a, **k)) or fits[-1])
+    fit = online_diagnosis.fit
+    monkeypatch.setattr(online_diagnosis, "fit", lambda *a, **k: fits.append(fit(*a, **k)) or fits[-1])
     _, model, recording = hidden_case(structure, effect, seed)
-    diagnosis = LiveDiagnosis(model, recording.test)
+    diagnosis = OnlineDiagnosis(model, recording.test)
     state = diagnosis.init()
     for end in (0.030, 0.035):
         state, _ = diagnosis.update(state, so_far(recording, end))
@@ -175,7 +175,7 @@ def test_a_fit_that_goes_on_from_the_last_update_ends_where_one_begun_afresh_doe
 
 
 def test_an_update_is_the_same_again_and_changes_nothing_that_it_was_given(damped):
-    diagnosis = LiveDiagnosis(damped[1], damped[2].test, budget=np.inf)
+    diagnosis = OnlineDiagnosis(damped[1], damped[2].test, budget=np.inf)
     seen = so_far(damped[2], 0.03)
     values = seen.values.copy()
     state, _ = diagnosis.update(diagnosis.init(), seen)
@@ -186,17 +186,17 @@ def test_an_update_is_the_same_again_and_changes_nothing_that_it_was_given(dampe
 
 def test_too_few_samples_say_nothing_and_a_model_without_its_channel_is_refused(damped):
     _, model, recording = damped
-    diagnosis = LiveDiagnosis(model, recording.test)
+    diagnosis = OnlineDiagnosis(model, recording.test)
     assert diagnosis.update(diagnosis.init(), so_far(recording, 0.001))[1] is None
     other = hidden_case("side", "", 8120)[2]
     with pytest.raises(RecordingError, match="has no channel"):
-        LiveDiagnosis(model, other.test)
+        OnlineDiagnosis(model, other.test)
 
 
 def test_a_coarse_record_keeps_the_means_and_the_noise_of_a_mean():
     _, model, recording = hidden_case("side", "", 8120)
-    record = make_record(model, recording)
-    coarse = coarsened(record)
+    record = observe(model, recording)
+    coarse = in_bins(record)
     count = len(coarse.at)
     per_bin = round(record.noise[0] ** 2 / coarse.noise[0] ** 2)
     # a whole number of samples in a bin
@@ -240,7 +240,7 @@ def test_the_story_tells_of_all_revisions_in_ten_lines_or_less(damped):
 def test_of_a_model_that_leaves_nothing_at_all_a_candidate_explains_nothing():
     """So it can be for the first samples of a recording without noise: there is nothing to take a share of."""
     addition = Addition(EFFECTS["added_mass"], "car")
-    tried = Tried(addition, 3.0, None, Screened(addition, 3.0, 10.0, 5.0))
-    round_ = Round(SimpleNamespace(fit=SimpleNamespace(cost=0.0)), [tried])
-    (ranked,) = ranking_of(round_, 1)
+    tried = CandidateFit(addition, 3.0, None, Screened(addition, 3.0, 10.0, 5.0))
+    step = SelectionStep(SimpleNamespace(fit=SimpleNamespace(cost=0.0)), [tried])
+    (ranked,) = ranking_of(step)
     assert ranked.name == "added_mass on car" and ranked.explained == 0.0

@@ -11,7 +11,7 @@ from helpers_diagnosis import Stage, hidden_case, joined
 from helpers_waiting import PATIENCE
 from numpy.testing import assert_allclose, assert_array_equal
 
-from crash_estimator.core.diagnosis.diagnosis import Diagnosis, diagnose
+from crash_estimator.core.diagnosis.report.diagnosis import Diagnosis, diagnose
 from crash_estimator.core.effects.change import add_effect
 from crash_estimator.nodes.effect_requests import request_of, with_effect
 from crash_replay.bag import time_zero_ns, write_bag
@@ -145,7 +145,7 @@ def test_each_revision_has_its_curves(stage, case, offline):
     for message, fitted in zip(final, offline.models):
         assert message.number == first
         assert_array_equal(message.time_ns, case[2].time_ns[after])
-        record, predicted = fitted.records[0], fitted.left.predicted[0]
+        record, predicted = fitted.records[0], fitted.residuals.predicted[0]
         assert_allclose(joined([message], "measured"), record.measured, rtol=1e-12)
         assert_allclose(joined([message], "predicted"), predicted, rtol=1e-6, atol=1e-6 * np.abs(predicted).max())
         assert_allclose(joined([message], "residual"), record.measured - predicted, atol=1e-6 * np.abs(predicted).max())

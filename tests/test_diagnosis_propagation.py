@@ -5,28 +5,28 @@ import pytest
 from helpers_diagnosis import hidden_case
 from numpy.testing import assert_allclose
 
-from crash_estimator.core.diagnosis.curves import value
-from crash_estimator.core.diagnosis.fit import fit
-from crash_estimator.core.diagnosis.layout import make_layout
-from crash_estimator.core.diagnosis.linearise import linearise
-from crash_estimator.core.diagnosis.linkforce import link_force
-from crash_estimator.core.diagnosis.normal import binned
-from crash_estimator.core.diagnosis.propagate import propagate, respond
-from crash_estimator.core.diagnosis.records import make_record
-from crash_estimator.core.diagnosis.scales import make_scales
+from crash_estimator.core.diagnosis.mechanics.linearization import linearise
+from crash_estimator.core.diagnosis.mechanics.link_force import link_force
+from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.diagnosis.output_error.gauss_newton import fit
+from crash_estimator.core.diagnosis.output_error.normal_equations import binned
+from crash_estimator.core.diagnosis.output_error.problem import make_problem
+from crash_estimator.core.diagnosis.output_error.sensitivity_equations import propagate, respond
+from crash_estimator.core.diagnosis.parameterization.free_curve import value
+from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 
 
 def fitted(structure: str):
     _, model, recording = hidden_case(structure, "", 8201)
-    records = [make_record(model, recording)]
-    layout = make_layout(model, records, make_scales(model, records, 36), ())
-    return layout, records[0], fit(layout, records)
+    records = [observe(model, recording)]
+    problem = make_problem(measure_magnitudes(model, records, 36), records, ())
+    return problem.layout, records[0], fit(problem)
 
 
 @pytest.mark.parametrize("structure", ["frontal", "side", "dummy"])
 def test_a_small_change_of_the_parameters_is_felt_as_the_sum_of_their_columns(structure):
     layout, record, found = fitted(structure)
-    equations = linearise(layout, record, 0, found.theta, found.trajectories[0])
+    equations = linearise(found.problem.experiments[0], found.theta, found.trajectories[0])
     out = np.zeros((record.bins, len(layout.outputs), 1 + len(equations.columns)))
     propagate(equations.linear, equations.sampling, out)
     std = np.sqrt(np.diagonal(found.covariance))[equations.columns]

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from crash_estimator.core.diagnosis.diagnosis import diagnose
-from crash_estimator.core.diagnosis.live_answer import final_answer
+from crash_estimator.core.diagnosis.online.online_answer import final_answer
+from crash_estimator.core.diagnosis.report.diagnosis import diagnose
 from crash_estimator.model_file import load_model
 from crash_replay.readers import read_source
 

@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 from scipy.fft import dct, idct
 
-from crash_estimator.core.diagnosis.candidates import candidates
-from crash_estimator.core.diagnosis.diagnosis import diagnose
-from crash_estimator.core.diagnosis.model import fit_model
-from crash_estimator.core.diagnosis.records import make_record
-from crash_estimator.core.diagnosis.rounds import bounded
-from crash_estimator.core.diagnosis.scales import make_scales
-from crash_estimator.core.diagnosis.trying import OFFSET_STARTS, OFFSETS, offset_starts
-from crash_estimator.core.diagnosis.whiteness import Absorbed, whiteness, whiteness_of_fit
+from crash_estimator.core.diagnosis import THRESHOLDS
+from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
+from crash_estimator.core.diagnosis.report.diagnosis import diagnose
+from crash_estimator.core.diagnosis.residuals.band_test import Absorbed, band_test, band_test_of_fit
+from crash_estimator.core.diagnosis.selection.candidate_fits import grid_starts
+from crash_estimator.core.diagnosis.selection.candidates import candidates
+from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
+from crash_estimator.core.diagnosis.selection.selection_step import bounded
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.model_file import ModelFile
 from crash_replay.synthetic.hidden.cases import draw_case
@@ -31,7 +32,7 @@ def test_noise_that_a_fit_has_absorbed_is_not_taken_for_an_effect():
     """One wrong alarm in a thousand is meant: four in 400 come once in a thousand runs."""
     rng = np.random.default_rng(3)
     known = [np.full(1, np.inf)]
-    found = [whiteness_of_fit([[left_by_a_fit(rng.normal(size=SAMPLES))[1]]], known) for _ in range(400)]
+    found = [band_test_of_fit([[left_by_a_fit(rng.normal(size=SAMPLES))[1]]], known) for _ in range(400)]
     assert sum(not one.white for one in found) < 4
     assert abs(np.mean([one.probability for one in found]) - 0.5) < 4.0 / np.sqrt(12.0 * len(found))
 
@@ -43,8 +44,8 @@ def test_a_wave_that_a_fit_has_mostly_absorbed_is_seen_in_what_it_leaves():
     noise[8:12] = np.array([1.0, -1.0, 1.0, -1.0]) * np.sqrt(7.0)
     residual, absorbed = left_by_a_fit(idct(noise, norm="ortho"))
     known = [np.full(1, np.inf)]
-    assert whiteness([residual], known, [PERIOD]).white
-    found = whiteness_of_fit([[absorbed]], known)
+    assert band_test([residual], known, [PERIOD]).white
+    found = band_test_of_fit([[absorbed]], known)
     assert not found.white and found.worst.low == 0.0
 
 
@@ -52,22 +53,22 @@ def test_an_offset_is_searched_from_where_the_forces_fit_best():
     """It bends the measured motion: from the wrong side of zero no fit finds back (a side impact, one recording)."""
     drawn = draw_case("side", ("channel_offset",), 80026)
     structure = ModelFile.model_validate(dict(drawn.specimen.model)).structure()
-    records = [make_record(structure, drawn.record(1.1, 2.0)[0])]
-    scales = make_scales(structure, records, 36)
+    records = [observe(structure, drawn.record(1.1, 2.0)[0])]
+    magnitudes = measure_magnitudes(structure, records, 36)
     (hidden,) = drawn.hidden
-    addition = next(a for a in candidates(structure, scales, EFFECTS) if a.key == ("channel_offset", hidden.target))
-    model = fit_model(structure, records, scales, ())
-    none, *starts = [one.coefficient for one in offset_starts(records, scales, model, addition)]
-    assert none == 0.0 and len(starts) == OFFSET_STARTS
-    step = (addition.effect.high - addition.effect.low) / OFFSETS
-    assert abs(starts[0] - hidden.coefficient) < step
+    addition = next(a for a in candidates(magnitudes, EFFECTS) if a.key == ("channel_offset", hidden.target))
+    model = fit_model(magnitudes, records, ())
+    none, *starts = [one.coefficient for one in grid_starts(magnitudes, model, addition)]
+    assert none == 0.0 and len(starts) == THRESHOLDS.offset_starts
+    first, second, *_ = addition.effect.coefficient_grid()
+    assert abs(starts[0] - hidden.coefficient) < second - first
 
 
 def test_a_motion_without_bounds_leaves_no_more_than_was_measured():
     """Its residual would be taken for noise 20 powers of ten larger than any signal."""
     drawn = draw_case("impactor", ("viscous_damping",), 3100)
     structure = ModelFile.model_validate(dict(drawn.specimen.model)).structure()
-    record = make_record(structure, drawn.record(1.1, 1.0)[0])
+    record = observe(structure, drawn.record(1.1, 1.0)[0])
     small, wild = 0.1 * record.measured, 1e25 * record.measured
     assert bounded([small], [record])[0] is small
     assert bounded([wild], [record])[0] is record.measured

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.effects.base import ElementForce, ElementMotion
-from crash_estimator.core.effects.targets import checked, key_of, possible_targets
+from crash_estimator.core.effects.targets import checked
 from crash_estimator.core.effects.user import load_effects
 from crash_estimator.core.structure import EffectSpec, ModelError
 from crash_estimator.model_file import load_model
@@ -82,11 +82,11 @@ def test_the_limits_are_physical():
 
 def test_targets_are_elements_bodies_channels_and_pairs():
     structure = load_model("side_dummy")
-    kinds = {name: key_of(effect) for name, effect in EFFECTS.items()}
+    kinds = {name: effect.acts_on for name, effect in EFFECTS.items()}
     assert (kinds["clearance"], kinds["added_mass"], kinds["channel_gain"]) == ("element", "body", "channel")
-    assert "rib_spine" in possible_targets(structure, EFFECTS["clearance"])
-    assert "door_upper" not in possible_targets(structure, EFFECTS["added_mass"])
-    assert "rib-pelvis" in possible_targets(structure, EFFECTS["load_path"])
+    assert "rib_spine" in EFFECTS["clearance"].possible_targets(structure, None)
+    assert "door_upper" not in EFFECTS["added_mass"].possible_targets(structure, None)
+    assert "rib-pelvis" in EFFECTS["load_path"].possible_targets(structure, None)
 
 
 def friction(**shape: float) -> EffectSpec:

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.constants import g as G
 from test_architecture import modules_after
 
-from crash_estimator.core.diagnosis.diagnosis import diagnose
+from crash_estimator.core.diagnosis.report.diagnosis import diagnose
 from crash_estimator.model_file import load_model
 from crash_replay.bag import read_bag, write_bag
 from crash_replay.recording import RecordingError

@@ -7,7 +7,7 @@ USE = """
 import sys
 from itertools import islice
 from crash_estimator.core.compile_cache import compiling_said
-from crash_estimator.core.diagnosis.diagnosis import diagnose
+from crash_estimator.core.diagnosis.report.diagnosis import diagnose
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.methods import METHODS, make_estimator
 from crash_estimator.model_file import load_model

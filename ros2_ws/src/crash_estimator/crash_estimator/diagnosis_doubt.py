@@ -8,8 +8,7 @@ stacked; or one of them is as large as it may be.
 
 import numpy as np
 
-from .core.diagnosis.diagnosis import Diagnosis
-from .core.diagnosis.model import Model
+from .core.diagnosis import Diagnosis, Model
 from .tables import never_touches
 
 LITTLE = 0.5
@@ -50,7 +49,7 @@ def starts(found: Diagnosis) -> str:
 
 def untouched(model: Model) -> list[str]:
     """Elements that are apart in all recordings."""
-    of_each = zip(model.fit.layout.structure.elements, *model.left.links)
+    of_each = zip(model.fit.layout.structure.elements, *model.residuals.links)
     return [element.name for element, *links in of_each if all(link.apart.all() for link in links)]
 
 
@@ -59,7 +58,7 @@ def worst_explained(model: Model) -> tuple[str, float]:
     worst = "", 1.0
     for q, output in enumerate(model.fit.layout.outputs):
         measured = np.concatenate([record.measured[:, q] for record in model.records])
-        left = np.concatenate([residual[:, q] for residual in model.left.residual])
+        left = np.concatenate([residual[:, q] for residual in model.residuals.residual])
         noise = float(np.mean([record.noise[q] ** 2 for record in model.records]))
         power = float(np.nanmean(measured**2))
         if power > HEARD**2 * noise:
@@ -73,9 +72,9 @@ def at_limit(found: Diagnosis) -> list[str]:
     layout, theta = found.models[-1].fit.layout, found.models[-1].fit.theta
     added = {(step.effect, step.target) for step in found.steps}
     names = []
-    for place in layout.places:
-        value, low, high = (of[place.coefficient] for of in (theta, layout.prior.low, layout.prior.high))
+    for term in layout.terms:
+        value, low, high = (of[term.coefficient] for of in (theta, layout.prior.low, layout.prior.high))
         limit = high if value > 0.0 else low
-        if place.addition.key in added and limit and value / limit > AT_LIMIT:
-            names.append(" on ".join(place.addition.key))
+        if term.addition.key in added and limit and value / limit > AT_LIMIT:
+            names.append(" on ".join(term.addition.key))
     return names

@@ -5,11 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.constants import g as G
 
-from .core.diagnosis.answer import Ranked
-from .core.diagnosis.diagnosis import Diagnosis
-from .core.diagnosis.misfit import MisfitWindow
-from .core.diagnosis.model import Model
-from .core.diagnosis.trying import GAIN
+from .core.diagnosis import THRESHOLDS, Diagnosis, MisfitWindow, Model, Ranked
 from .tables import READABLE, table
 
 SHOWN = 8
@@ -49,11 +45,13 @@ def misfit_table(windows: Sequence[MisfitWindow], title: str) -> str:
 def ranking_table(ranking: Sequence[Ranked]) -> str:
     """The best candidates of the first round that gain anything."""
     shown = [ranked for ranked in ranking[:SHOWN] if ranked.evidence > 0.0]
-    if not shown or shown[0].evidence < GAIN:
-        best = f": the best, {shown[0].name}, gains {shown[0].evidence:.1f} nats of {GAIN:.0f}" if shown else ""
+    if not shown or shown[0].evidence < THRESHOLDS.gain:
+        best = (
+            f": the best, {shown[0].name}, gains {shown[0].evidence:.1f} nats of {THRESHOLDS.gain:.0f}" if shown else ""
+        )
         return f"no candidate counts{best}"
     head = ("candidate", "coefficient", "sigma", "unit", "evidence", "explained", "not told from")
-    legend = f"evidence in nats, from {GAIN:.0f} on it counts; explained: share of what the model leaves"
+    legend = f"evidence in nats, from {THRESHOLDS.gain:.0f} on it counts; explained: share of what the model leaves"
     screened = "; ?: an estimate, not fitted" if not all(ranked.fitted for ranked in shown) else ""
     return f"{table(head, [_row(ranked) for ranked in shown])}\n{legend}{screened}"
 
@@ -92,9 +90,9 @@ def revisions_table(found: Diagnosis) -> str:
     names = ["as given", *(f"+ {step.effect} on {step.target}" for step in found.steps)]
     rows = []
     for name, model, run in zip(names, found.models, runs):
-        white = "yes" if model.left.whiteness.white else "no"
-        each = [f"{value:#.3g}" for value in _each_output(model, model.left.residual)]
-        rows.append((name, f"{model.left.rms / G:#.3g}", *each, f"{run / G:#.3g}", white))
+        white = "yes" if model.residuals.band_test.white else "no"
+        each = [f"{value:#.3g}" for value in _each_output(model, model.residuals.residual)]
+        rows.append((name, f"{model.residuals.rms / G:#.3g}", *each, f"{run / G:#.3g}", white))
     first = found.models[0]
     noise = [np.broadcast_to(record.noise, record.measured.shape) for record in first.records]
     floor = [f"{value:#.3g}" for value in _each_output(first, noise)]

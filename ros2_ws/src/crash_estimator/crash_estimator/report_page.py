@@ -12,10 +12,10 @@ from crash_replay.output import written_into
 from crash_replay.recording import Recording, RecordingError
 
 from .core.characteristic import characteristics
-from .core.diagnosis.diagnosis import diagnose
+from .core.diagnosis import diagnose
 from .core.effects import EFFECTS
 from .core.effects.applied import applied
-from .core.effects.base import Effect
+from .core.effects.effect import Effect
 from .core.estimate import Description, ElementState, Estimate, ParameterStatus
 from .core.fold import run
 from .core.free_run import compare, free_run

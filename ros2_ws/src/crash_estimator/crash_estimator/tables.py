@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from .core.effects.base import Effect
+from .core.effects.effect import Effect
 from .core.errors import EquationError
 from .core.estimate import Description, Estimate, ParameterStatus
 from .core.structure import EffectSpec

@@ -9,7 +9,7 @@ from multiprocessing import get_context
 from crash_replay.said import say
 from crash_replay.synthetic.recordings import simulate_recording
 
-from .core.diagnosis.diagnosis import diagnose
+from .core.diagnosis import diagnose
 from .core.effects import EFFECTS
 from .core.methods import make_estimator
 from .model_file import load_model

@@ -9,7 +9,7 @@ from crash_replay.recording import Recording, RecordingError
 from crash_replay.synthetic.hidden.cases import HiddenCase, draw_case
 from crash_replay.synthetic.hidden.outside import OUTSIDE
 
-from ..core.diagnosis.diagnosis import Diagnosis, diagnose
+from ..core.diagnosis import Diagnosis, diagnose
 from ..core.structure import ModelError, Structure
 from ..model_file import load_model
 from .effects_plan import Case

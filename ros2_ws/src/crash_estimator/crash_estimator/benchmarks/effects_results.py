@@ -23,10 +23,10 @@ ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THRE
 def code() -> str:
     """A fingerprint of the search, of the cases and of a row: rows made by other code are not counted.
 
-    The live ranking (`live*.py`) judges no case: it ends in the same search.
+    The online diagnosis judges no case: it ends in the same search.
     """
     folders = [Path(package.__file__).parent for package in (diagnosis, effects, hidden)]
-    paths = [path for folder in folders for path in sorted(folder.glob("*.py")) if not path.name.startswith("live")]
+    paths = [path for folder in folders for path in sorted(folder.rglob("*.py")) if path.parent.name != "online"]
     digest = sha256()
     for path in (Path(effects_judge.__file__), *paths):
         digest.update(path.read_bytes())

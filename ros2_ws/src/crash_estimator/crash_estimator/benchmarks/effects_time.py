@@ -5,8 +5,7 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from ..core.diagnosis.diagnosis import diagnose
-from ..core.diagnosis.live import LiveDiagnosis
+from ..core.diagnosis import OnlineDiagnosis, diagnose
 from .effects_judge import drawn
 from .effects_plan import Case
 
@@ -21,7 +20,7 @@ def timed(case: Case) -> dict:
     diagnose(structure, recordings)
     wall, cpu = perf_counter() - wall, process_time() - cpu
     *others, recording = recordings
-    live = LiveDiagnosis(structure, recording.test, others)
+    live = OnlineDiagnosis(structure, recording.test, others)
     state, updates = live.init(), []
     for end in np.arange(EVERY, recording.time_ns[-1] * 1e-9, EVERY):
         seen = recording.time_ns <= end * 1e9

@@ -14,7 +14,7 @@ from crash_replay.output import check_outputs, write_text
 from crash_replay.recording import Recording, RecordingError
 
 from ..core.effects import EFFECTS
-from ..core.effects.base import Effect
+from ..core.effects.effect import Effect
 from ..core.effects.user import load_effects
 from ..core.structure import ModelError
 from ..model_file import model_path

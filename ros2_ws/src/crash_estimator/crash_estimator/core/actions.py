@@ -16,7 +16,7 @@ The last three are not linear. They are taken linear about the latest theta: for
 import numpy as np
 
 from .contact import SpringLaw
-from .effects.base import ElementMotion
+from .effects.effect import ElementMotion
 from .estimate import Description, Estimate
 from .kinematics import Motion
 from .structure import Action, Structure

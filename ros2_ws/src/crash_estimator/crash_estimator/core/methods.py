@@ -10,8 +10,8 @@ from crash_replay.recording import Sample, Test
 from .compiled.estimator import CompiledEstimator
 from .effects import EFFECTS
 from .effects.applied import applied
-from .effects.base import AttachedBody, BodyForce, BodyInertia, ChannelError, Effect
 from .effects.channels import Corrected, known_errors
+from .effects.effect import Effect
 from .estimate import Description, Estimate
 from .estimator import Estimator, Method
 from .estimators.afmm import Afmm
@@ -94,9 +94,7 @@ def make_estimator(
         applied(
             structure, test, effects
         )  # says what is wrong with any of them, before those of the channels are taken out
-        left = tuple(
-            e for e in structure.effects if e.coefficient is None or not isinstance(effects[e.type], ChannelError)
-        )
+        left = tuple(e for e in structure.effects if e.coefficient is None or not effects[e.type].distorts)
         structure = replace(structure, effects=left)
         return Corrected(
             make_estimator(structure, test, method, damping_after, effective_mass, compiled, effects, **settings),
@@ -130,7 +128,7 @@ def make_estimator(
 def _check_masses_alone(structure: Structure, effects: Mapping[str, Effect]) -> None:
     """Raises ModelError where an effect changes the balance of momentum from which effective masses are found."""
     for spec in structure.effects:
-        if isinstance(effects.get(spec.type), (AttachedBody, BodyForce, BodyInertia, ChannelError)):
+        if spec.type in effects and effects[spec.type].balances_momentum:
             raise ModelError(
                 f"model {structure.name}: effective masses cannot be found with effect {spec.type} on {spec.target}: "
                 "leave one of them out"

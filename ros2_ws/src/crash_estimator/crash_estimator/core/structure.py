@@ -96,6 +96,7 @@ class Element:
     displacement: str | None = None  # channel of the crush, instead of integrating accelerations
     velocity: str | None = None  # channel of the rate of crush; None: the crush's derivative
     terms: tuple[Term, ...] = ()  # powers beyond the first
+    damper_pulls: bool = True  # without tension: the damper may pull until the spring is spent; False: never
     unloading_slope: Coefficient | None = None  # an unloading stiffness to be estimated, in place of a known one
     origin: float = 0.0  # m: the crush counts from here, as beyond a gap
     factor: Callable[[np.ndarray], np.ndarray] | None = None  # of the rates (n,) m/s: what multiplies the static force
@@ -264,8 +265,8 @@ class Structure:
 
     @property
     def first_order(self) -> bool:
-        """Whether stiffness and damping of the first power, with known unloading, are all there is."""
-        more = any(e.terms or e.unloading_slope or e.origin or e.factor for e in self.elements)
+        """Whether stiffness and damping of the first power, with known unloading, are all there is; dampers may pull."""
+        more = any(e.terms or e.unloading_slope or e.origin or e.factor or not e.damper_pulls for e in self.elements)
         return not (more or self.actions or any(body.carried_by for body in self.bodies))
 
     def reduced_mass(self, element: int) -> float:

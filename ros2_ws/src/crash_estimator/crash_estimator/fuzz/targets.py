@@ -22,8 +22,8 @@ from crash_replay.ros_messages import channel_to_msg, decoded, stamp, test_from_
 
 from ..cli.common import parse_settings
 from ..core.effects import EFFECTS
-from ..core.effects.base import ElementForce, ElementMotion
-from ..core.effects.user import FUNCTION, load_effects
+from ..core.effects.effect import ElementMotion
+from ..core.effects.user import load_effects
 from ..core.methods import METHODS, make_estimator
 from ..following.alignment import Alignment
 from ..kept import Kept
@@ -169,10 +169,10 @@ def _take_effect(folder: Path) -> None:
     time = np.linspace(0.0, 0.3, 200)
     for effect in load_effects(folder / "mine.py").values():
         motion = ElementMotion(time, np.sin(40.0 * time), np.cos(40.0 * time), np.ones(200), 1e5 * time)
-        if function := FUNCTION.get(type(effect)):
+        if effect.function:
             shapes = {name: shape.starts[-1] for name, shape in effect.shapes.items()}
             with np.errstate(all="ignore"):
-                getattr(effect, function)(motion if isinstance(effect, ElementForce) else time, **shapes)
+                getattr(effect, effect.function)(effect.trial_argument(motion), **shapes)
 
 
 REQUEST = AddEffect.Request(effect="coulomb_friction", target="rib_spine", options=["coefficient=1810", "speed=0.1"])

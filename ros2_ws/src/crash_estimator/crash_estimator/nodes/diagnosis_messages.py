@@ -9,8 +9,7 @@ from builtin_interfaces.msg import Time
 from crash_msgs.msg import Misfit, MisfitWindow, RankedEffect, Ranking, Residuals
 from std_msgs.msg import Header
 
-from ..core.diagnosis.answer import Ranked
-from ..core.diagnosis.live_answer import FitCurves, LiveAnswer
+from ..core.diagnosis import FitCurves, OnlineAnswer, Ranked
 from ..core.structure import EffectSpec, Structure
 
 FINAL = "structured_fit"
@@ -31,7 +30,7 @@ class Moment(NamedTuple):
     final: bool
 
 
-def ranking_message(at: Moment, answer: LiveAnswer) -> Ranking:
+def ranking_message(at: Moment, answer: OnlineAnswer) -> Ranking:
     before, after = answer.white
     return Ranking(
         header=Header(stamp=at.stamp),
@@ -61,7 +60,7 @@ def ranking_message(at: Moment, answer: LiveAnswer) -> Ranking:
     )
 
 
-def misfit_message(at: Moment, answer: LiveAnswer) -> Misfit:
+def misfit_message(at: Moment, answer: OnlineAnswer) -> Misfit:
     windows = [MisfitWindow(start=w.start, end=w.end, body=w.body, state=w.state, rms=w.rms) for w in answer.misfit]
     return Misfit(header=Header(stamp=at.stamp), run=at.run, number=at.number, model=at.structure.name, windows=windows)
 

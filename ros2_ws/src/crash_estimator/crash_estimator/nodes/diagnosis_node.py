@@ -25,7 +25,7 @@ from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import stamp, stamp_ns, test_from_msg
 from crash_replay.ros_runtime import run
 
-from ..core.diagnosis.live_answer import LiveAnswer
+from ..core.diagnosis import OnlineAnswer
 from ..core.effects import EFFECTS
 from ..core.effects.change import remove_effect
 from ..core.effects.user import load_effects
@@ -84,7 +84,7 @@ class DiagnosisNode(Node):
         self.done = Future()  # when nothing more can be diagnosed
         self.prepared = False  # its process has compiled its code
         self.rest_of = 0  # the pass that what has not come is asked of
-        self.finals: dict[tuple[int, int], LiveAnswer] = {}  # by revision and samples missing
+        self.finals: dict[tuple[int, int], OnlineAnswer] = {}  # by revision and samples missing
         self.complaints = Complaints(lambda line: self.get_logger().error(line))
         self.telling = Telling(self, self.structure)
         self.worker = Worker(self.structure, effects, self.bags)
@@ -248,14 +248,14 @@ class DiagnosisNode(Node):
             )
         return not self.stopped
 
-    def _conclude(self, at: Moment, answer: LiveAnswer) -> None:
+    def _conclude(self, at: Moment, answer: OnlineAnswer) -> None:
         self.telling.tell(at, answer, self.kept, self.time_zero)
         if not at.final:
             return
         self._add_found(at, answer)
         self.attending.tell()
 
-    def _add_found(self, at: Moment, answer: LiveAnswer) -> None:
+    def _add_found(self, at: Moment, answer: OnlineAnswer) -> None:
         self.finals[at.revision, self.kept.missing(at.number + 1)] = answer
         if self.adds and answer.found:
             self.adds = False

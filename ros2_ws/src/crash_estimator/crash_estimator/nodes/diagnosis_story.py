@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from scipy.constants import g as G
 
-from ..core.diagnosis.live_answer import LiveAnswer
+from ..core.diagnosis import OnlineAnswer
 
 CANDIDATES = 3
 WINDOWS = 2
@@ -15,7 +15,7 @@ class Told(NamedTuple):
     """The final answer on one revision of the model."""
 
     name: str  # "side_dummy + coulomb_friction on door_rib"
-    answer: LiveAnswer
+    answer: OnlineAnswer
 
 
 def story(revisions: Sequence[Told]) -> list[str]:

@@ -7,7 +7,7 @@ from rclpy.node import Node
 from crash_replay.qos import SAID
 from crash_replay.ros_messages import stamp
 
-from ..core.diagnosis.live_answer import LiveAnswer
+from ..core.diagnosis import OnlineAnswer
 from ..core.structure import Structure
 from ..kept import Kept
 from .diagnosis_messages import Moment, misfit_message, ranking_message, revision_message, revision_name
@@ -34,7 +34,7 @@ class Telling:
     def name(self, structure: Structure) -> str:
         return revision_name(self.given, structure, ())
 
-    def tell(self, at: Moment, answer: LiveAnswer, kept: Kept, time_zero: int) -> None:
+    def tell(self, at: Moment, answer: OnlineAnswer, kept: Kept, time_zero: int) -> None:
         """kept: the samples it rests on; time_zero: stamp of the impact, ns."""
         self.ranking_out.publish(ranking_message(at, answer))
         self.misfit_out.publish(misfit_message(at, answer))
@@ -49,7 +49,7 @@ class Telling:
         if at.final:
             self._tell_story(at, answer, kept.missing(at.number + 1))
 
-    def _tell_story(self, at: Moment, answer: LiveAnswer, missing: int) -> None:
+    def _tell_story(self, at: Moment, answer: OnlineAnswer, missing: int) -> None:
         self.told[at.revision] = Told(self.name(at.structure), answer)
         for line in story([told for _, told in sorted(self.told.items())]):
             self.node.get_logger().info(line)

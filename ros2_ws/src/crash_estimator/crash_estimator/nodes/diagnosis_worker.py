@@ -18,11 +18,9 @@ from crash_replay.fault import Fault
 from crash_replay.recording import Channel, Recording, RecordingError, Test
 
 from ..core.compile_cache import compiling_said
-from ..core.diagnosis.diagnosis import diagnose
-from ..core.diagnosis.live import LiveDiagnosis, LiveState
-from ..core.diagnosis.live_answer import LiveAnswer, final_answer
+from ..core.diagnosis import OnlineAnswer, OnlineDiagnosis, OnlineState, diagnose, final_answer
 from ..core.effects import EFFECTS
-from ..core.effects.base import Effect
+from ..core.effects.effect import Effect
 from ..core.effects.user import load_effects
 from ..core.structure import ModelError, Structure
 
@@ -45,18 +43,18 @@ class Answerer:
     def __init__(self, effects: Mapping[str, Effect], others: Sequence[Recording] = ()):
         """others: recordings of the same structure that are used with the replayed one."""
         self.effects, self.others = effects, others
-        self.live: LiveDiagnosis | None = None
-        self.state = LiveState()
+        self.live: OnlineDiagnosis | None = None
+        self.state = OnlineState()
         self.samples = 0
 
-    def answer(self, task: Task) -> LiveAnswer | None:
+    def answer(self, task: Task) -> OnlineAnswer | None:
         """None where the samples are too few. Raises ModelError or RecordingError."""
         structure, recording = task.structure, task.recording
         if task.final:
             return final_answer(diagnose(structure, [recording, *self.others], self.effects))
         live = self.live
         if live is None or live.structure != structure or live.test != recording.test or len(recording) < self.samples:
-            live = LiveDiagnosis(structure, recording.test, self.others, self.effects)
+            live = OnlineDiagnosis(structure, recording.test, self.others, self.effects)
             self.live, self.state = live, live.init()
         self.samples = len(recording)
         self.state, answer = live.update(self.state, recording)
@@ -81,7 +79,7 @@ class WorkerError(Fault):
 
 
 class Reply(NamedTuple):
-    answer: LiveAnswer | None
+    answer: OnlineAnswer | None
     error: str = ""  # one line
 
 

@@ -7,8 +7,8 @@ from crash_msgs.srv import AddEffect
 from crash_replay.recording import Test
 
 from ..core.effects import EFFECTS
-from ..core.effects.base import Effect
 from ..core.effects.change import add_effect
+from ..core.effects.effect import Effect
 from ..core.structure import EffectSpec, ModelError, Structure
 
 WORDS = ("host", "touches", "taken_from", "variant")

@@ -1,1 +1,20 @@
-"""Which physical effect is missing (`diagnose`), and where a model fails."""
+"""Which physical effect a model lacks, and where it fails: output-error fits, compared by their evidence.
+
+`diagnose` compares a structure with whole recordings; `OnlineDiagnosis` says as much as the samples so far allow.
+The packages within, each importing only those before it: observation, parameterization, mechanics, output_error,
+residuals, selection, report, online.
+"""
+
+from .online.candidate_turns import OnlineState
+from .online.online_answer import FitCurves, OnlineAnswer, final_answer
+from .online.online_diagnosis import OnlineDiagnosis
+from .report.diagnosis import Diagnosis, diagnose
+from .report.ranking import Ranked, StepReport
+from .residuals.misfit_windows import MisfitWindow
+from .selection.fitted_model import Model
+from .selection.thresholds import THRESHOLDS
+
+__all__ = [
+    "THRESHOLDS", "Diagnosis", "FitCurves", "MisfitWindow", "Model", "OnlineAnswer", "OnlineDiagnosis", "OnlineState", "Ranked",
+    "StepReport", "diagnose", "final_answer",
+]  # fmt: skip

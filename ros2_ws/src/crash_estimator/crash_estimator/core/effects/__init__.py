@@ -17,7 +17,7 @@ from . import (
     unmodelled_body,
     viscous_damping,
 )
-from .base import Effect
+from .effect import Effect
 
 _FILES = (
     viscous_damping,

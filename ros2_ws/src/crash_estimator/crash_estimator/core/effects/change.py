@@ -7,7 +7,7 @@ from crash_replay.recording import Test
 
 from ..structure import EffectSpec, ModelError, Structure
 from . import EFFECTS
-from .base import Effect
+from .effect import Effect
 from .targets import checked
 
 

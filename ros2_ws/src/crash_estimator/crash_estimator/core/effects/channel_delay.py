@@ -2,4 +2,4 @@
 
 from .base import ChannelError
 
-EFFECT = ChannelError("channel_delay", "s", high=1e-3, size=4e-4, role="delay")
+EFFECT = ChannelError("channel_delay", "s", high=1e-3, size=4e-4, distorts="delay")

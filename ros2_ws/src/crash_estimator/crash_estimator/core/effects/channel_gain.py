@@ -2,4 +2,4 @@
 
 from .base import ChannelError
 
-EFFECT = ChannelError("channel_gain", "", low=-0.1, high=0.1, size=0.05, role="gain")
+EFFECT = ChannelError("channel_gain", "", low=-0.1, high=0.1, size=0.05, distorts="gain")

@@ -4,4 +4,4 @@ from .base import ChannelError
 
 LIMIT = 5.0 * 9.80665
 
-EFFECT = ChannelError("channel_offset", "m/s^2", low=-LIMIT, high=LIMIT, size=0.5 * LIMIT, role="offset")
+EFFECT = ChannelError("channel_offset", "m/s^2", low=-LIMIT, high=LIMIT, size=0.5 * LIMIT, distorts="offset")

@@ -15,7 +15,7 @@ from crash_replay.recording import Sample, Test
 
 from ..structure import Structure
 from . import EFFECTS
-from .base import ChannelError, Effect
+from .effect import Effect
 
 
 class ChannelErrors(NamedTuple):
@@ -31,8 +31,8 @@ def known_errors(structure: Structure, test: Test, effects: Mapping[str, Effect]
     found, any_known = ChannelErrors(*np.zeros((3, len(test.channels)))), False
     for spec in structure.effects:
         effect = effects.get(spec.type)
-        if isinstance(effect, ChannelError) and spec.coefficient is not None:
-            getattr(found, effect.role)[test.index(spec.target, f"effect {spec.type}")] += spec.coefficient
+        if effect is not None and effect.distorts and spec.coefficient is not None:
+            getattr(found, effect.distorts)[test.index(spec.target, f"effect {spec.type}")] += spec.coefficient
             any_known = True
     return found if any_known else None
 

@@ -2,44 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
-from itertools import permutations
 
 from crash_replay.limits import NUMBER
 from crash_replay.recording import Test
 
 from ..structure import EffectSpec, ModelError, Structure
-from .base import AttachedBody, BodyForce, BodyInertia, ChannelError, Effect, PairSpring, StaticFactor
+from .effect import Effect
 
 NOUN = {"element": "an element", "body": "a free body", "channel": "a channel", "between": "two bodies"}
-
-
-def key_of(effect: Effect) -> str:
-    """What the target is called in a model file: element, body, channel or between."""
-    match effect:
-        case PairSpring():
-            return "between"
-        case AttachedBody() | ChannelError():
-            return "channel"
-        case BodyInertia() | BodyForce():
-            return "body"
-    return "element"
-
-
-def possible_targets(structure: Structure, effect: Effect, test: Test | None = None) -> list[str] | None:
-    """All that an effect of this kind can act on; None: any channel that the model does not use, of an unknown test."""
-    match key_of(effect):
-        case "element":
-            return [element.name for element in structure.elements]
-        case "body":
-            return [body.name for body in structure.bodies if body.free]
-        case "between":
-            return [f"{a.name}-{b.name}" for a, b in permutations(structure.bodies, 2) if a.free or b.free]
-    used = [name for body in structure.bodies for name in (*body.acceleration, body.force) if name]
-    if isinstance(effect, ChannelError):
-        return used
-    if test is None:
-        return None
-    return [c.name for c in test.channels if c.quantity == "acceleration" and c.name not in used]
 
 
 def check_effects(structure: Structure, effects: Mapping[str, Effect]) -> None:
@@ -61,10 +31,10 @@ def checked(structure: Structure, spec: EffectSpec, effects: Mapping[str, Effect
     """
     effect = _known(structure, spec.type, effects)
     what = f"model {structure.name}: effect {spec.type}"
-    targets = possible_targets(structure, effect, test)
+    targets = effect.possible_targets(structure, test)
     if targets is not None and spec.target not in targets:
         raise ModelError(
-            f"{what} cannot act on {spec.target!r}; it needs {NOUN[key_of(effect)]}: {_choice(spec.target, targets)}"
+            f"{what} cannot act on {spec.target!r}; it needs {NOUN[effect.acts_on]}: {_choice(spec.target, targets)}"
         )
     for name in spec.shape:
         if name not in effect.shapes:
@@ -86,7 +56,7 @@ def _admissible(what: str, coefficient: float, effect: Effect) -> None:
     """Raises ModelError where a coefficient is outside the effect's physical limits."""
     if wrong := NUMBER.wrong(coefficient):
         raise ModelError(f"{what}: coefficient {wrong}")
-    low, high = (0.0, float("inf")) if isinstance(effect, StaticFactor) else (effect.low, effect.high)
+    low, high = effect.stated_limits()
     if not low <= coefficient <= high:
         limits = f"not below {low:g}" if high == float("inf") else f"from {low:g} to {high:g}"
         raise ModelError(f"{what}: coefficient must be {limits} {effect.unit}".rstrip() + f", got {coefficient:g}")

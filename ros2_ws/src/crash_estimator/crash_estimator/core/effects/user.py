@@ -13,10 +13,7 @@ from crash_replay.limits import NUMBER, YAML_FILE, file_wrong, shown
 
 from ..structure import ModelError
 from . import EFFECTS
-from .base import BodyForce, Effect, ElementForce, ElementMotion, Shape, StaticFactor
-
-FUNCTION = {ElementForce: "force", StaticFactor: "factor", BodyForce: "force"}
-"""The field that holds the physics, by the kind of effect that has one."""
+from .effect import Effect, ElementMotion, Shape
 
 INSTANTS = 64
 """Of the motion that a function is tried on: to the largest crush, back, and beyond, to apart."""
@@ -55,8 +52,8 @@ def _checked(path: str | Path, effect: Effect) -> Effect:
         raise ModelError(f"{path}: {effect.name!r} is an effect of the vocabulary already: choose another name")
     if wrong := _wrong_constants(effect):
         raise ModelError(f"{where}: {wrong}")
-    function = FUNCTION.get(type(effect))
-    if function is None:
+    function = effect.function
+    if not function:
         return effect
     if not callable(getattr(effect, function)):
         raise ModelError(f"{where}: {function} must be a function, got {shown(getattr(effect, function))}")
@@ -116,11 +113,7 @@ def _try_out(where: str, effect: Effect, function: str) -> None:
     time = np.linspace(0.0, 0.1, INSTANTS)
     crush = LARGEST_CRUSH * np.sin(40.0 * time)
     peak, rate = np.maximum.accumulate(crush), np.gradient(crush, time)
-    argument = {
-        ElementForce: ElementMotion(time, crush, rate, peak, 1e5 * np.maximum(crush, 0.0)),
-        StaticFactor: rate,
-        BodyForce: time,
-    }[type(effect)]
+    argument = effect.trial_argument(ElementMotion(time, crush, rate, peak, 1e5 * np.maximum(crush, 0.0)))
     shapes = {n: s.starts[0] * (LARGEST_CRUSH if s.of_crush else 1.0) for n, s in effect.shapes.items()}
     with np.errstate(all="ignore"):
         values = getattr(effect, function)(argument, **shapes)

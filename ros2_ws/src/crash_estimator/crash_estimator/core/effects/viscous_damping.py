@@ -10,4 +10,4 @@ def force(motion: ElementMotion):
     return motion.rate
 
 
-EFFECT = ElementForce("viscous_damping", "N*s/m", force=force)
+EFFECT = ElementForce("viscous_damping", "N*s/m", force=force, doubles="damping")

@@ -1,0 +1,115 @@
+"""Motions as the sensors show them, if they err as the parameters say; where bodies start, and driven ones go."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..observation.record import DRIVEN_MODES, ObservedRecord
+from ..observation.trajectory import Trajectory, integrate
+from ..parameterization.experiment import Experiment
+from ..parameterization.layout import FREE, Layout
+from ..parameterization.magnitudes import attached_start
+
+
+class Distortion(NamedTuple):
+    """A channel's error: recorded(t) = (1 + gain) true(t - delay) + offset, and its parameters (-1: none)."""
+
+    gain: float = 0.0
+    delay: float = 0.0
+    offset: float = 0.0
+    parameters: tuple[int, int, int] = (-1, -1, -1)
+
+
+NO_DISTORTION = Distortion()
+
+
+def distortion(layout: Layout, theta: np.ndarray, channel: str) -> Distortion:
+    terms = [t for t in layout.terms if t.addition.target == channel and t.addition.effect.distorts]
+    if not terms:
+        return NO_DISTORTION
+    found, parameters = {"gain": 0.0, "delay": 0.0, "offset": 0.0}, {"gain": -1, "delay": -1, "offset": -1}
+    for term in terms:
+        found[term.addition.effect.distorts] = float(theta[term.coefficient])
+        parameters[term.addition.effect.distorts] = term.coefficient
+    found["delay"] = max(found["delay"], 0.0)  # at its limit it may be a rounding error below
+    return Distortion(**found, parameters=tuple(parameters.values()))
+
+
+def driven_motion(experiment: Experiment, theta: np.ndarray) -> np.ndarray:
+    """Acceleration (g, b) of the driven bodies."""
+    layout, record, r = experiment
+    a = np.zeros((len(layout.bodies), len(record.time))).T
+    for k, names in _driving(layout).items():
+        for name in names:
+            a[:, k] += true_acceleration(record, name, distortion(layout, theta, name)) / len(names)
+        first = layout.modes[r][k]
+        a[:, k] += record.cosines @ theta[first : first + DRIVEN_MODES + 1]
+    return a
+
+
+def driven_by(experiment: Experiment, theta: np.ndarray) -> list[tuple[int, int, np.ndarray]]:
+    """Its derivatives: (body, parameter, (g,))."""
+    layout, record, r = experiment
+    by = []
+    for k, names in _driving(layout).items():
+        for name in names:
+            d = distortion(layout, theta, name)
+            true, share = true_acceleration(record, name, d), 1.0 / len(names)
+            gain, delay, offset = d.parameters
+            if gain >= 0:
+                by.append((k, gain, -share * true / (1.0 + d.gain)))
+            if offset >= 0:
+                by.append((k, offset, np.full(len(true), -share / (1.0 + d.gain))))
+            if delay >= 0:
+                signal, after, step = record.signals[name], record.time + d.delay, 0.5 * record.step
+                up, down = (np.interp(after + s * step, signal.time, signal.values) for s in (1.0, -1.0))
+                by.append((k, delay, share * (up - down) / (2.0 * step) / (1.0 + d.gain)))
+        first = layout.modes[r][k]
+        by += [(k, first + j, record.cosines[:, j]) for j in range(DRIVEN_MODES + 1)]
+    return by
+
+
+def _driving(layout: Layout) -> dict[int, Sequence[str]]:
+    """The driven bodies, and the channels that each is driven by."""
+    found = {k: body.acceleration for k, body in enumerate(layout.structure.bodies) if body.driven}
+    return found | {k: (channel,) for channel, k in layout.attached.items()}
+
+
+def true_acceleration(record: ObservedRecord, channel: str, d: Distortion) -> np.ndarray:
+    """(g,) What a channel has measured, if it errs like that."""
+    signal = record.signals[channel]
+    recorded = np.interp(record.time + d.delay, signal.time, signal.values) if d.delay else signal.on_grid
+    return (recorded - d.offset) / (1.0 + d.gain)
+
+
+def start_values(layout: Layout, record: ObservedRecord) -> tuple[np.ndarray, np.ndarray]:
+    """(b,) initial velocities and displacements, attached bodies included."""
+    v0, x0 = list(record.initial_velocity), list(record.initial_displacement)
+    by_channel = {t.addition.target: t.addition for t in layout.terms if t.addition.effect.attaches_body}
+    for channel in layout.attached:
+        x, v = attached_start(layout.structure, record, by_channel[channel])
+        v0.append(v)
+        x0.append(x)
+    return np.array(v0), np.array(x0)
+
+
+def measured_motion(experiment: Experiment, theta: np.ndarray) -> Trajectory:
+    """What the sensors say of the motion, if they err as theta says."""
+    layout, record, _ = experiment
+    a = np.zeros((len(layout.bodies), len(record.time))).T
+    for k, body in enumerate(layout.structure.bodies):
+        for name in body.acceleration if body.free else ():
+            a[:, k] += true_acceleration(record, name, distortion(layout, theta, name)) / len(body.acceleration)
+    return motion_of(experiment, theta, a)
+
+
+def motion_of(experiment: Experiment, theta: np.ndarray, free: np.ndarray) -> Trajectory:
+    """The trajectory in which free bodies accelerate as given (g, bodies) and driven ones as theta says."""
+    layout, record, _ = experiment
+    a = driven_motion(experiment, theta)
+    for k in np.flatnonzero(layout.kind == FREE):
+        a[:, k] = free[:, k]
+    v0, x0 = start_values(layout, record)
+    v, x = integrate(record.dt, a, v0, x0)
+    return Trajectory(a, v, x)

@@ -1,0 +1,188 @@
+"""The equations of motion along a trajectory: what they miss (defect), and how motion and parameters change them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..observation.record import ObservedRecord
+from ..observation.trajectory import Trajectory, measured_crush
+from ..parameterization.experiment import Experiment
+from ..parameterization.layout import DRIVEN, FREE, Layout
+from ..parameterization.terms import Link
+from .driven_motion import driven_by
+from .linear_system import Linear, Sampling, ranked
+from .link_force import LinkForce, link_force
+from .masses import attached_inertia, body_loads, mass_shares, masses
+from .outputs import sampling
+
+
+class Equations(NamedTuple):
+    """One experiment's equations at a trajectory."""
+
+    linear: Linear
+    sampling: Sampling
+    rows: np.ndarray  # (g, b) acceleration of free and driven bodies, force on fixed ones, as the forces give them
+    columns: np.ndarray  # parameter of each column after the first, (columns - 1,); of knots only those in use
+    links: list[LinkForce]
+
+
+class Observer(NamedTuple):
+    """What draws free bodies towards a motion: - rate^2 (x - x_target) - 2 rate (v - v_target), critically damped."""
+
+    rate: float  # 1/s
+    target: Trajectory
+
+    def acceleration(self, trajectory: Trajectory) -> np.ndarray:
+        """(g, b) m/s^2, away from the target."""
+        x, v = trajectory.x - self.target.x, trajectory.v - self.target.v
+        return self.rate**2 * x + 2.0 * self.rate * v
+
+
+class OtherLaw(NamedTuple):
+    """A law for a link of the layout that is only tried out."""
+
+    link: Link  # whose last term's coefficient is the parameter after the layout's last
+    value: float  # of that coefficient
+
+
+class _Actions:
+    """External accelerations and forces per unit of a parameter, column by column."""
+
+    def __init__(self, inverse_mass: np.ndarray):
+        self.inverse_mass = inverse_mass
+        self.columns: dict[int, int] = {}  # by parameter
+        self.acting: list[tuple[int, int, np.ndarray]] = []
+
+    def act(self, parameter: int, body: int, values: np.ndarray) -> None:
+        self.acting.append((self.columns.setdefault(parameter, 1 + len(self.columns)), body, values))
+
+    def push(self, parameter: int, ends: tuple[int, int], force: np.ndarray) -> None:
+        for k, sign in zip(ends, (-1.0, 1.0), strict=True):
+            if self.inverse_mass[k]:
+                self.act(parameter, k, sign * self.inverse_mass[k] * force)
+
+
+def linearise(
+    experiment: Experiment, theta: np.ndarray, trajectory: Trajectory, others: Sequence[OtherLaw] = (),
+    observer: Observer | None = None, contact_ramp: float = 1.0,
+) -> Equations:  # fmt: skip
+    """Forces and derivatives along a trajectory whose driven bodies already move as theta says.
+
+    others: other laws for links of the layout; each gives one more column, numbered from layout.size on, the change of
+    force when that law takes the place of the present one. contact_ramp: steps of time in which contact opens and
+    closes.
+    """
+    layout, record, r = experiment
+    mass = masses(layout, theta)
+    measured = np.array([_measured(layout, body) for body in range(len(layout.bodies))], dtype=float)
+    inverse = np.where(layout.kind == FREE, 1.0 / mass, measured)
+    driven = layout.kind == DRIVEN
+    inverse[driven] = 0.0
+    actions = _Actions(inverse)
+    loads, forces = _link_forces(experiment, theta, trajectory, others, contact_ramp, actions)
+    for term, k, load in body_loads(layout, record, attached_inertia(layout, record, trajectory)):
+        loads[:, k] += float(theta[term.coefficient]) * load
+        actions.act(term.coefficient, k, inverse[k] * load)
+    rows = loads * inverse
+    rows[:, driven] = trajectory.a[:, driven]
+    for k, parameter, share in mass_shares(layout):
+        actions.act(parameter, k, -share * inverse[k] * rows[:, k])
+    for k, parameter, column in driven_by(experiment, theta):
+        actions.act(parameter, k, column)
+    sampled, of_outputs = sampling(experiment, theta)
+    for parameter in [*of_outputs, *(layout.offsets[r] + q for q in range(len(layout.outputs)))]:
+        actions.columns.setdefault(parameter, 1 + len(actions.columns))
+    defect = rows.copy()
+    free = layout.kind == FREE
+    defect[:, free] -= trajectory.a[:, free]
+    if observer:
+        defect[:, free] -= observer.acceleration(trajectory)[:, free]
+    for k in np.flatnonzero(~driven):
+        actions.acting.append((0, int(k), defect[:, k]))
+    linear, knots = _linear_system(experiment, forces, actions, observer.rate if observer else 0.0)
+    every = np.concatenate([np.array(list(actions.columns), dtype=int), knots])
+    return Equations(linear, sampled, rows, every, forces)
+
+
+def _link_forces(
+    experiment: Experiment, theta: np.ndarray, trajectory: Trajectory, others: Sequence[OtherLaw], contact_ramp: float,
+    actions: _Actions,
+) -> tuple[np.ndarray, list[LinkForce]]:  # fmt: skip
+    """(g, b) N that the links push the bodies with, and the links' forces one by one."""
+    layout, record, _ = experiment
+    loads, forces = np.zeros(trajectory.a.T.shape).T, []
+    steps = contact_ramp * _steps(record)
+    for link in layout.links:
+        found = link_force(link, theta, record.time, steps, *_crush_and_rate(link, experiment, trajectory))
+        a, c = link.ends
+        loads[:, a] -= found.force
+        loads[:, c] += found.force
+        for parameter, column in zip(found.parameters, found.columns, strict=True):
+            actions.push(parameter, link.ends, column)
+        forces.append(found)
+    present = {link.name: found for link, found in zip(layout.links, forces, strict=True)}
+    for j, (link, value) in enumerate(others):
+        motion = _crush_and_rate(link, experiment, trajectory)
+        other = link_force(_acting(link, theta), np.append(theta, value), record.time, steps, *motion)
+        actions.push(layout.size + j, link.ends, other.force - present[link.name].force)
+    return loads, forces
+
+
+def _linear_system(
+    experiment: Experiment, forces: Sequence[LinkForce], actions: _Actions, observer_rate: float
+) -> tuple[Linear, np.ndarray]:
+    """For the compiled passes; and the knots' parameters, in the order of their columns."""
+    layout, record, _ = experiment
+    g, n = len(record.time), len(forces)
+    column, body, acts = (np.array(each) for each in zip(*actions.acting, strict=True))
+    slopes = np.array([(f.kx, f.kv, f.kp) for f in forces], float).reshape(n, 3, g).transpose(1, 0, 2)
+    kx, kv, kp = np.ascontiguousarray(slopes)  # as one link's are already: for two layouts all would be compiled twice
+    peaks = [f.loading & f.kp.any() for f in forces]  # none is kept that nothing hangs on
+    knot, order, touched = ranked(np.array([f.knot for f in forces], np.int64).reshape(n, g, 2), layout.knots)
+    changed = np.ones(g, bool)
+    changed[1:] = (np.diff(kx) != 0.0).any(axis=0) | (np.diff(kv) != 0.0).any(axis=0)
+    changed[1:] |= np.abs(np.diff(record.dt)) > 1e-9 * record.step
+    return Linear(
+        dt=record.dt,
+        ends=np.array([link.ends for link in layout.links]).reshape(-1, 2),
+        crush_ends=np.array([link.crush_ends for link in layout.links]).reshape(-1, 2),
+        inverse_mass=actions.inverse_mass,
+        kind=layout.kind,
+        kx=kx,
+        kv=kv,
+        kp=kp,
+        loading=np.array(peaks, bool).reshape(n, g),
+        knot=knot,
+        weight=np.array([f.weight for f in forces], float).reshape(n, g, 2),
+        changed=changed,
+        observer=observer_rate,
+        others=1 + len(actions.columns),
+        column=column,
+        body=body,
+        acts=acts,
+        touched=touched,
+    ), order
+
+
+def _acting(link: Link, theta: np.ndarray) -> Link:
+    """Without effects that are at nothing: where only the force counts, their derivatives are work for nothing."""
+    return replace(link, terms=tuple(t for t in link.terms if t in link.in_law or theta[t.coefficient]))
+
+
+def _steps(record: ObservedRecord) -> np.ndarray:
+    """(g,) length of the step that an instant stands for."""
+    return np.maximum(record.dt, record.dt[1] if len(record.dt) > 1 else 1e-4)
+
+
+def _measured(layout: Layout, body: int) -> bool:
+    return any(output.body == body and output.fixed for output in layout.outputs)
+
+
+def _crush_and_rate(link: Link, experiment: Experiment, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    if link.displacement:
+        return measured_crush(experiment.record, link.displacement, link.velocity)
+    a, b = link.crush_ends
+    origin = link.origin[experiment.index] if link.origin else 0.0
+    return trajectory.x[:, a] - trajectory.x[:, b] - origin, trajectory.v[:, a] - trajectory.v[:, b]

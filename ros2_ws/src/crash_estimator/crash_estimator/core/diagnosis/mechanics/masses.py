@@ -1,0 +1,71 @@
+"""Masses as the parameters make them, and forces on single bodies."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from crash_replay.conditioning import cfc_filter
+
+from ..observation.noise_inflation import CFC, SLOWEST
+from ..observation.record import ObservedRecord
+from ..observation.trajectory import Trajectory
+from ..parameterization.experiment import Experiment
+from ..parameterization.layout import Layout
+from ..parameterization.terms import Term
+from .driven_motion import measured_motion
+
+
+def masses(layout: Layout, theta: np.ndarray) -> np.ndarray:
+    """(b,) kg; 1 of a body without one."""
+    mass = np.array([body.mass or 1.0 for body in layout.structure.bodies] + [1.0] * len(layout.attached))
+    for k, parameter, share in mass_shares(layout):
+        mass[k] += share * theta[parameter]
+    return mass
+
+
+def mass_shares(layout: Layout) -> Iterator[tuple[int, int, float]]:
+    """(body, parameter, kg for one unit of it)."""
+    for term in layout.terms:
+        for name, share in term.addition.effect.mass_shares(term.addition).items():
+            yield layout.structure.body_index[name], term.coefficient, share
+
+
+def body_loads(
+    layout: Layout, record: ObservedRecord, inertial: Callable[[str], np.ndarray]
+) -> Iterator[tuple[Term, int, np.ndarray]]:
+    """(term, body, force (g,) N for one unit of its coefficient): constant forces, and attached bodies' inertia."""
+    for term in layout.terms:
+        load = term.addition.effect.body_load(term.addition, record.time, inertial)
+        if load is not None:
+            yield term, layout.structure.body_index[load[0]], load[1]
+
+
+def attached_inertia(layout: Layout, record: ObservedRecord, trajectory: Trajectory) -> Callable[[str], np.ndarray]:
+    """Acceleration (g,) of an attached body that acts as inertia, by its channel.
+
+    Where noise stands for what is left of a structure that rings, its ringing is none: what counts is the band in
+    which such outputs are compared.
+    """
+    step = float(record.dt[-1])
+    rigid = record.noise_is_inflated and step * SLOWEST <= 1.0
+
+    def inertial(channel: str) -> np.ndarray:
+        a = trajectory.a[:, layout.attached[channel]]
+        return cfc_filter(a, step, CFC) if rigid else a
+
+    return inertial
+
+
+def balance_of(experiment: Experiment, theta: np.ndarray) -> np.ndarray:
+    """(g,) N: the force on a fixed body that the measured accelerations of all masses call for, - sum of M a."""
+    layout, record, _ = experiment
+    common = np.where(np.arange(layout.size) < layout.common, theta, 0.0)
+    motion = measured_motion(experiment, common)
+    mass = masses(layout, theta)
+    force = np.zeros(len(record.time))
+    for k, body in enumerate(layout.structure.bodies):
+        if body.free:
+            force -= mass[k] * motion.a[:, k]
+    for term, _, load in body_loads(layout, record, lambda channel: motion.a[:, layout.attached[channel]]):
+        force += theta[term.coefficient] * load
+    return force

@@ -1,0 +1,101 @@
+"""From accelerations and forces of the bodies to what the channels show, errors and noise of the channels included."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..parameterization.experiment import Experiment
+from ..parameterization.layout import Layout
+from .driven_motion import distortion
+from .linear_system import Sampling
+from .masses import masses
+
+
+class Noise(NamedTuple):
+    """Of one sample of each output, and how it grows with parameters: through the masses whose inertia is measured."""
+
+    std: np.ndarray  # (q,) SI
+    growth: list[tuple[int, int, float]]  # output, parameter, d ln(std) / d parameter
+
+
+def output_noise(experiment: Experiment, theta: np.ndarray, samples: int = 1) -> Noise:
+    """An attached body's inertia is felt with the noise of its channel: var_q = sigma_q^2 + (m / M)^2 sigma_a^2 s.
+
+    s = 1, or less for means over some samples of an output that a delay of a fraction f of the period smooths:
+    1 - 2 f (1 - f) / samples. In noise as large as what residuals leave, a sensor's is contained.
+    """
+    layout, record, _ = experiment
+    variance, growth = record.noise**2, []
+    terms = [term for term in layout.terms if term.addition.effect.attaches_body]
+    if record.noise_is_inflated or not terms:
+        return Noise(record.noise, growth)
+    mass, index = masses(layout, theta), layout.structure.body_index
+    for term in terms:
+        addition = term.addition
+        host, sigma = index[addition.host], record.signals[addition.target].noise
+        share = float(theta[term.coefficient]) / mass[host]
+        slope = (1.0 + (share if addition.taken_from == addition.host else 0.0)) / mass[host]
+        for q, output in enumerate(layout.outputs):
+            if output.body != host:
+                continue
+            delay, parameter = _delay(layout, theta, output.channel)
+            f = delay / record.period % 1.0
+            smoothed = 1.0 - 2.0 * f * (1.0 - f) / samples
+            variance[q] += (share * sigma) ** 2 * smoothed
+            growth.append((q, term.coefficient, share * slope * sigma**2 * smoothed))
+            if parameter >= 0:
+                growth.append((q, parameter, (share * sigma) ** 2 * (2.0 * f - 1.0) / (samples * record.period)))
+    return Noise(np.sqrt(variance), [(q, p, g / variance[q]) for q, p, g in growth])
+
+
+def _delay(layout: Layout, theta: np.ndarray, channel: str) -> tuple[float, int]:
+    found = distortion(layout, theta, channel)
+    return found.delay, found.parameters[1]
+
+
+def sampling(experiment: Experiment, theta: np.ndarray) -> tuple[Sampling, list[int]]:
+    """How rows become outputs, and the parameters that act on outputs only."""
+    layout, record, _ = experiment
+    found = [distortion(layout, theta, output.channel) for output in layout.outputs]
+    lag = np.array([d.delay / record.step for d in found])
+    parameters = [p for d in found for p in d.parameters if p >= 0]
+    return Sampling(
+        body=np.array([output.body for output in layout.outputs]),
+        gain=np.array([1.0 + d.gain for d in found]),
+        lag=np.floor(lag).astype(int),
+        fraction=lag - np.floor(lag),
+        bin=record.bin,
+        weight=record.valid / output_noise(experiment, theta, record.per_bin).std,
+    ), parameters
+
+
+def predicted(experiment: Experiment, theta: np.ndarray, rows: np.ndarray):
+    """(g, q) outputs that rows (g, b) give, and the columns of what acts on outputs only: (q, parameter, (g,))."""
+    layout, record, r = experiment
+    outputs, by = np.zeros((len(record.time), len(layout.outputs))), []
+    step = record.step
+    for q, output in enumerate(layout.outputs):
+        d = distortion(layout, theta, output.channel)
+        lag = d.delay / step
+        whole, fraction = int(np.floor(lag)), lag - np.floor(lag)
+        true = (1.0 - fraction) * _delayed(rows[:, output.body], whole)
+        if fraction:
+            true += fraction * _delayed(rows[:, output.body], whole + 1)
+            true[whole : whole + 1] = 0.0  # still an instant before the impact
+        offset = layout.offsets[r] + q
+        outputs[:, q] = (1.0 + d.gain) * true + d.offset + theta[offset]
+        by.append((q, offset, np.ones(len(true))))
+        gain, delay, jump = d.parameters
+        if gain >= 0:
+            by.append((q, gain, true))
+        if jump >= 0:
+            by.append((q, jump, np.ones(len(true))))
+        if delay >= 0:
+            slope = (_delayed(rows[:, output.body], whole + 1) - _delayed(rows[:, output.body], whole)) / step
+            slope[whole : whole + 1] *= fraction == 0.0
+            by.append((q, delay, (1.0 + d.gain) * slope))
+    return outputs, by
+
+
+def _delayed(values: np.ndarray, steps: int) -> np.ndarray:
+    return values if not steps else np.concatenate([np.zeros(steps), values[: len(values) - steps]])

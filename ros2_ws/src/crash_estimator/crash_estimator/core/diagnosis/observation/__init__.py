@@ -1,0 +1,1 @@
+"""A recording as the fit sees it: grid, sensor noise, measured trajectory, noise inflation."""

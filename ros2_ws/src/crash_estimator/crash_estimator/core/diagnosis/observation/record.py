@@ -1,0 +1,188 @@
+"""A recording made ready for the fit: samples after the impact on an even grid, and what is known of their noise.
+
+The simulation runs on a grid that has every sample on it, at no more than `LONGEST_STEP`. Each channel that a body or
+force is measured by is one output; outputs are compared in means over short bins of samples, since what a
+crash model can say ends far below 1 kHz.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from crash_replay.recording import Recording, Test
+
+from ...kinematics import Kinematics
+from ...structure import ModelError, Structure
+from .sensor_noise import sensor_noise
+
+LONGEST_STEP = 1.5e-4
+"""s: the linear-acceleration step's phase error is (omega dt)^2 / 24: 2e-5 for the stiffest contact, 200 rad/s."""
+
+BIN = 4e-4
+"""s: length of the bins that outputs are averaged over."""
+
+FEWEST_SAMPLES = 20
+
+DRIVEN_MODES = 6
+"""Cosines of a driven channel's noise beside its mean: integrated twice, what is faster moves nothing."""
+
+
+class Signal(NamedTuple):
+    """One channel, zero offset removed, NaN bridged, from before the impact to the end."""
+
+    time: np.ndarray  # s since the impact
+    values: np.ndarray
+    on_grid: np.ndarray  # (g,) values at the instants of the record
+    noise: float  # standard deviation of one sample
+    noise_samples: float  # that it was found from
+    offset_std: float  # of the zero offset that was removed
+
+
+class Output(NamedTuple):
+    """One measured channel that the simulation predicts."""
+
+    channel: str
+    body: int
+    fixed: bool  # a force on a fixed body
+
+
+class ObservedRecord(NamedTuple):
+    """One recording on a grid of g instants, with n samples of q outputs."""
+
+    test: Test
+    time: np.ndarray  # (g,) s since the impact, from 0
+    dt: np.ndarray  # (g,) s from the instant before; 0 at the first
+    step: float  # s, median of dt
+    at: np.ndarray  # (n,) indices of the samples on the grid
+    period: float  # s, median between samples
+    measured: np.ndarray  # (n, q) zero offset removed, NaN where not valid
+    on_grid: np.ndarray  # (g, q) the same at all instants, 0 where there is no valid sample
+    noise: np.ndarray  # (q,) standard deviation of one sample
+    noise_samples: np.ndarray  # (q,) samples that it was found from; inf where the model states it
+    offset_std: np.ndarray  # (q,)
+    signals: dict[str, Signal]  # every acceleration channel, and the measured crush and rate channels
+    initial_displacement: np.ndarray  # (b,) m
+    initial_velocity: np.ndarray  # (b,) m/s
+    bin: np.ndarray  # (g,) bin of the sample at that instant, -1 where none
+    valid: np.ndarray  # (g, q) 1 where a sample is valid, divided by the root of the valid samples in its bin
+    bins: int
+    cosines: np.ndarray  # (g, 1 + DRIVEN_MODES), the mean first
+    whitener: np.ndarray | None = None  # (q, q) of outputs in units of their noise; None: independent, as the sensors'
+
+    @property
+    def noise_is_inflated(self) -> bool:
+        """Noise stands for what a model leaves, not for the sensors' alone."""
+        return self.whitener is not None
+
+    @property
+    def per_bin(self) -> int:
+        return round(len(self.at) / self.bins)
+
+
+def outputs_of(structure: Structure) -> tuple[Output, ...]:
+    """Every channel of every free body, and the measured force of every fixed one."""
+    found = []
+    for k in structure.equations:
+        body = structure.bodies[k]
+        found += [Output(name, k, False) for name in body.acceleration] if body.free else [Output(body.force, k, True)]
+    return tuple(found)
+
+
+def observe(structure: Structure, recording: Recording) -> ObservedRecord:
+    """Raises ModelError or RecordingError, one line, where the recording does not serve the model."""
+    kinematics = Kinematics(structure, recording.test)  # checks the channels, knows the initial motion
+    after = recording.time_ns >= 0
+    if np.count_nonzero(after) < FEWEST_SAMPLES:
+        raise ModelError(
+            f"test {recording.test.id} has {np.count_nonzero(after)} samples after the impact, too few to fit"
+        )
+    sample_time = recording.time_ns[after] * 1e-9
+    time, at = _grid(sample_time)
+    outputs = outputs_of(structure)
+    names = [name for _, name, _ in structure.channels()]
+    names += [c.name for c in recording.test.channels if c.quantity == "acceleration"]
+    signals = {name: _signal(recording, name, time) for name in dict.fromkeys(names)}
+    measured = np.stack([_raw(recording, o.channel, signals[o.channel])[after] for o in outputs], axis=1)
+    given = [structure.bodies[o.body].noise for o in outputs]
+    noise = np.array([g or signals[o.channel].noise for g, o in zip(given, outputs)])
+    bin_, valid, bins = bins_of(time, at, measured)
+    return ObservedRecord(
+        test=recording.test,
+        time=time,
+        dt=np.diff(time, prepend=time[0]),
+        step=float(np.median(np.diff(time))),
+        at=at,
+        period=float(np.median(np.diff(time[at]))),
+        measured=measured,
+        on_grid=on_grid(time, at, measured),
+        noise=noise,
+        noise_samples=np.array([np.inf if g else signals[o.channel].noise_samples for g, o in zip(given, outputs)]),
+        offset_std=np.array([signals[o.channel].offset_std for o in outputs]),
+        signals=signals,
+        initial_displacement=kinematics.initial_displacement,
+        initial_velocity=kinematics.initial_velocity,
+        bin=bin_,
+        valid=valid,
+        bins=bins,
+        cosines=cosines_of(time),
+    )
+
+
+def cosines_of(time: np.ndarray) -> np.ndarray:
+    """`cosines` of a ObservedRecord on a grid of instants."""
+    return np.cos(np.outer(np.pi * time / time[-1], np.arange(DRIVEN_MODES + 1)))
+
+
+def _grid(sample_time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Instants from time zero on, with every sample among them -> (g,) s, (n,) index of each sample."""
+    stops = sample_time if sample_time[0] < 1e-9 else np.concatenate([[0.0], sample_time])
+    steps = np.maximum(np.ceil(np.diff(stops) / LONGEST_STEP - 1e-6).astype(int), 1)
+    index = np.concatenate([[0], np.cumsum(steps)])
+    within = np.arange(index[-1]) - np.repeat(index[:-1], steps)
+    time = within * np.repeat(np.diff(stops) / steps, steps) + np.repeat(stops[:-1], steps)
+    return np.append(time, stops[-1]), index[len(stops) - len(sample_time) :]
+
+
+def on_grid(time: np.ndarray, at: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """`on_grid` of a ObservedRecord."""
+    found = np.zeros((len(time), measured.shape[1]))
+    found[at] = np.nan_to_num(measured)
+    return found
+
+
+def _signal(recording: Recording, name: str, grid: np.ndarray) -> Signal:
+    values = recording.column(name)
+    valid = np.isfinite(values)
+    if not valid.any():
+        raise ModelError(f"test {recording.test.id}: channel {name} has no valid sample")
+    channel = recording.test.channels[recording.test.index(name)]
+    before = valid & (recording.time_ns < 0)
+    count = np.count_nonzero(before)
+    rests = channel.quantity in ("acceleration", "force")
+    offset = float(values[before].mean()) if rests and count else 0.0
+    bridged = np.interp(recording.time_ns, recording.time_ns[valid], values[valid]) - offset
+    noise = sensor_noise(bridged, recording.time_ns, rests)
+    values = np.interp(grid, recording.time, bridged)
+    return Signal(recording.time, bridged, values, *noise, noise.std / np.sqrt(count) if count else 0.0)
+
+
+def _raw(recording: Recording, name: str, signal: Signal) -> np.ndarray:
+    return np.where(np.isfinite(recording.column(name)), signal.values, np.nan)
+
+
+def bins_of(
+    time: np.ndarray, at: np.ndarray, measured: np.ndarray, length: float = BIN
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """`bin`, `valid` and `bins` of a ObservedRecord whose bins are `length` s long."""
+    period = float(np.median(np.diff(time[at])))
+    per_bin = max(1, int(round(length / period)))
+    bin_ = np.full(len(time), -1)
+    bin_[at] = np.arange(len(at)) // per_bin
+    bins = int(bin_.max()) + 1
+    ok = np.isfinite(measured).astype(float)
+    ok[time[at] < 1e-9] = 0.0  # at the very impact forces may jump: on which side this sample lies is chance
+    count = np.zeros((bins, measured.shape[1]))
+    np.add.at(count, bin_[at], ok)
+    valid = np.zeros((len(time), measured.shape[1]))
+    valid[at] = ok / np.sqrt(np.maximum(count[bin_[at]], 1.0))
+    return bin_, valid, bins

@@ -1,0 +1,1 @@
+"""The same while the samples come."""

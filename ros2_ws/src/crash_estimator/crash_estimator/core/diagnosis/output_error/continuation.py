@@ -1,0 +1,50 @@
+"""Continuation: a fit goes through problems that become harder step by step, so that each begins close to its end.
+
+At first an observer draws the simulation towards the measured motion, the noise is taken larger than it is, and contact
+opens and closes over several steps of time; all of these fade out.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Stage(NamedTuple):
+    """One iteration's problem."""
+
+    observer: float  # 1/s
+    inflate: float  # factor on the noise
+    contact_ramp: float  # steps of time in which contact opens and closes
+
+
+Schedule = tuple[Stage, ...]
+
+FREE_RUN = Stage(0.0, 1.0, 1.0)
+"""The problem itself."""
+
+FROM_MEASURED_MOTION: Schedule = (
+    Stage(200.0, 30.0, 16.0), Stage(80.0, 10.0, 8.0), Stage(30.0, 3.0, 4.0), Stage(0.0, 1.0, 2.0),
+)  # fmt: skip
+"""Of a fit that starts from the measured motion. The first observer holds a body within a quarter period of the fastest
+crash (5 ms). A force that jumps at separation is felt by the fit only while it jumps: ramped, it is drawn to the right
+instant."""
+
+SMALL_STEPS: Schedule = (
+    *(
+        Stage(observer, 1.5 * observer, ramp)
+        for observer, ramp in zip(np.geomspace(200.0, 3.0, 16), np.geomspace(16.0, 2.0, 16), strict=True)
+    ),
+    Stage(0.0, 2.0, 6.0),
+    Stage(0.0, 1.0, 2.0),
+)
+"""Where that has led nowhere, as a light body between stiff elements may: the observer is let go in small steps, and
+less is believed at first, so that less is fitted to a motion that is still wrong."""
+
+LARGE_NOISE: Schedule = tuple(stage._replace(inflate=100.0 * stage.inflate) for stage in FROM_MEASURED_MOTION)
+"""Where not even that leads anywhere, as with a measured motion that errs by far."""
+
+FROM_SIMULATION: Schedule = (Stage(0.0, 2.0, 6.0), Stage(0.0, 1.0, 2.0))
+"""Of a fit that starts from a simulation of another model."""
+
+SLOW_CONTACT: Schedule = tuple(Stage(0.0, 1.0, ramp) for ramp in (8.0, 8.0, 8.0, 4.0, 4.0, 4.0, 2.0, 2.0, 2.0))
+"""Where a force that jumps at separation has stopped a fit short."""

@@ -1,0 +1,127 @@
+"""Normal equations of the output error, linearised along a trajectory that need not be a simulation yet."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ... import compile_cache as _compile_cache  # noqa: F401  before any compiled function is defined
+from ..mechanics.driven_motion import measured_motion
+from ..mechanics.linearization import Equations, Observer, OtherLaw, linearise
+from ..mechanics.outputs import output_noise, predicted
+from ..observation.record import ObservedRecord
+from ..observation.trajectory import Trajectory
+from ..parameterization.experiment import Experiment
+from ..parameterization.layout import FREE
+from .continuation import FREE_RUN, Stage
+from .problem import OutputErrorProblem, Point
+from .sensitivity_equations import propagate
+
+may_diverge = np.errstate(over="ignore", invalid="ignore", divide="ignore")
+"""A trial step can lead into motions without bounds; that its result is not finite is noticed in `gauss_newton.solve`."""
+
+
+class Normal(NamedTuple):
+    """Whitened residual and its derivative at one parameter vector, summed up: cost(d) = c - 2 b d + d A d."""
+
+    matrix: np.ndarray  # (p, p)
+    vector: np.ndarray  # (p,)
+    cost: float  # sum of squares of the whitened residual
+    samples: int
+    grown: float  # 2 sum of ln(noise with that of measured inertias / noise): what louder noise costs in likelihood
+
+
+@may_diverge
+def normal_equations(
+    problem: OutputErrorProblem, point: Point, stage: Stage = FREE_RUN, others: Sequence[OtherLaw] = ()
+) -> tuple[Normal, list[Equations]]:
+    """Summed up over the experiments; others: laws that are only tried out, each with a parameter after the layout's."""
+    size = problem.layout.size + len(others)
+    found = Normal(np.zeros((size, size)), np.zeros(size), 0.0, 0, 0.0)
+    every = []
+    for experiment, trajectory in zip(problem.experiments, point.trajectories, strict=True):
+        observer = Observer(stage.observer, measured_motion(experiment, point.theta)) if stage.observer else None
+        equations = linearise(experiment, point.theta, trajectory, others, observer, stage.contact_ramp)
+        found = _summed(found, experiment, point.theta, trajectory, equations, observer)
+        every.append(equations)
+    return found, every
+
+
+@may_diverge
+def equation_error(problem: OutputErrorProblem, point: Point) -> Normal:
+    """The same on a given motion: without that the motion changes with the forces."""
+    found = Normal(np.zeros((problem.layout.size,) * 2), np.zeros(problem.layout.size), 0.0, 0, 0.0)
+    for experiment, trajectory in zip(problem.experiments, point.trajectories, strict=True):
+        equations = linearise(experiment, point.theta, trajectory)
+        still = np.zeros_like(equations.linear.kx)
+        equations = equations._replace(linear=equations.linear._replace(kx=still, kv=still, kp=still))
+        found = _summed(found, experiment, point.theta, trajectory, equations)
+    return found
+
+
+def _summed(so_far: Normal, experiment: Experiment, theta, trajectory, equations, observer=None) -> Normal:
+    """With one experiment more; the matrix and the vector are added to in place."""
+    matrix, vector, cost, samples, grown = so_far
+    record = experiment.record
+    flat = whitened(experiment, theta, trajectory, equations, observer)
+    flat = flat.reshape(-1, flat.shape[-1])
+    products = flat.T @ flat
+    _put(equations.columns, products, matrix, vector)
+    noise, filled = output_noise(experiment, theta, record.per_bin), _filled(record)
+    for q, parameter, slope in noise.growth:
+        # a noisy regressor draws its coefficient towards zero, by as much as the noise it brings grows with it
+        vector[parameter] += slope * filled[q]
+    grown += 2.0 * float(filled @ np.log(noise.std / record.noise))
+    return Normal(matrix, vector, cost + float(products[0, 0]), samples + len(flat), grown)
+
+
+@njit(cache=True)
+def _put(columns, products, matrix, vector):
+    """Add the products of a record's columns where their parameters are."""
+    for i in range(len(columns)):
+        vector[columns[i]] += products[0, i + 1]
+        for j in range(len(columns)):
+            matrix[columns[i], columns[j]] += products[i + 1, j + 1]
+
+
+def _filled(record: ObservedRecord) -> np.ndarray:
+    """(q,) bins with a valid sample."""
+    return np.count_nonzero(binned(record, record.valid), axis=0)
+
+
+def whitened(
+    experiment: Experiment, theta: np.ndarray, trajectory: Trajectory, equations: Equations,
+    observer: Observer | None = None,
+) -> np.ndarray:  # fmt: skip
+    """(bins, q, 1 + columns): whitened binned residual corrected for the defect, then its derivative."""
+    layout, record, _ = experiment
+    out = np.zeros((record.bins, len(layout.outputs), 1 + len(equations.columns)))
+    propagate(equations.linear, equations.sampling, out)
+    # what acts on outputs only is linearised at the forces' prediction: the measured motion itself is noisy
+    weight = equations.sampling.weight
+    position = {int(p): j + 1 for j, p in enumerate(equations.columns[: equations.linear.others - 1])}
+    for q, parameter, column in predicted(experiment, theta, equations.rows)[1]:
+        out[:, q, position[parameter]] += binned(record, (weight[:, q] * column)[:, None])[:, 0]
+    # along the trajectory: the free bodies' own acceleration less the observer's; fixed forces are in column 0
+    along = np.where(layout.kind == FREE, trajectory.a, 0.0)
+    if observer:
+        along += np.where(layout.kind == FREE, observer.acceleration(trajectory), 0.0)
+    misfit = record.on_grid - predicted(experiment, theta, along)[0]
+    out[:, :, 0] = binned(record, weight * misfit) - out[:, :, 0]
+    return record.whitener @ out if record.noise_is_inflated else out
+
+
+def binned(record: ObservedRecord, values: np.ndarray) -> np.ndarray:
+    """(bins, columns) sums of values (g, columns) at the samples."""
+    found = np.zeros((record.bins, values.shape[1]))
+    _add_up(record.bin, values, found)
+    return found
+
+
+@njit(cache=True)
+def _add_up(bins, values, found):
+    for k in range(values.shape[1]):
+        for t in range(len(bins)):
+            if bins[t] >= 0:
+                found[bins[t], k] += values[t, k]

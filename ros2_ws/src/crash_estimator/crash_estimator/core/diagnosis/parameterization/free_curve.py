@@ -1,0 +1,80 @@
+"""Free characteristics: a piecewise-linear F(X) with a prior that slopes change little from knot to knot.
+
+The slope is a random walk in crush (an integrated Wiener process, the Gaussian-process prior of a cubic smoothing
+spline): between knots a distance d apart its change has the variance (ROUGHNESS K)^2 d / X_scale, with K the scale
+F_scale / X_scale of the element's stiffness. F(0) = 0.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+FIRST_SLOPE = 5.0
+"""Prior standard deviation of the slope at the origin, in K."""
+
+ROUGHNESS = 4.0
+"""Standard deviation of the slope's change over the whole crush scale, in K; see `adapted_roughness`."""
+
+TAIL = 3.0
+
+
+class Curve(NamedTuple):
+    """Knots (n,) in m, and for each its parameter's number (n,), -1 for the one at the origin; magnitudes in m and N."""
+
+    knots: np.ndarray
+    column: np.ndarray
+    crush_scale: float
+    force_scale: float
+
+
+def make_knots(lowest: float, highest: float, scale: float, cells: int, tension: bool) -> np.ndarray:
+    """Even knots over the crushes met and one cell beyond, with one at 0."""
+    step = scale / cells
+    first = int(np.floor(min(lowest, 0.0) / step)) - 1 if tension else 0
+    last = max(int(np.ceil(max(highest, 0.0) / step)), 1) + 1
+    return np.arange(first, last + 1) * step
+
+
+def value(curve: Curve, theta: np.ndarray, crush: np.ndarray) -> np.ndarray:
+    """(g,) N: the curve at crush (g,) m; straight on beyond the last knots."""
+    force_at = np.where(curve.column >= 0, theta[curve.column], 0.0)
+    cell = np.clip(np.searchsorted(curve.knots, crush, side="right") - 1, 0, len(curve.knots) - 2)
+    right = (crush - curve.knots[cell]) / np.diff(curve.knots)[cell]
+    low, high = force_at[cell], force_at[cell + 1]
+    return low + right * (high - low)
+
+
+def slope_changes(knots: np.ndarray, crush_scale: float, force_scale: float) -> tuple[np.ndarray, np.ndarray]:
+    """(n - 1, n) the slope at the origin and the changes of slope at the inner knots, of forces at knots; and their
+    prior standard deviations (n - 1,) for a roughness of 1."""
+    stiffness = force_scale / crush_scale
+    n = len(knots)
+    slopes = np.diff(np.eye(n), axis=0) / np.diff(knots)[:, None]
+    first = slopes[int(np.clip(np.searchsorted(knots, 0.0), 0, n - 2))]
+    apart = 0.5 * (knots[2:] - knots[:-2])
+    std = np.concatenate([[FIRST_SLOPE], np.sqrt(apart / crush_scale)])
+    return np.vstack([first, np.diff(slopes, axis=0)]), stiffness * std
+
+
+def prior_precision(
+    knots: np.ndarray, crush_scale: float, force_scale: float, roughness: np.ndarray | float
+) -> np.ndarray:
+    """(n, n) precision of the forces at the knots; the origin's row is to be left out.
+
+    roughness: one number, or one for each inner knot (n - 2,).
+    """
+    rows, std = slope_changes(knots, crush_scale, force_scale)
+    scaled = rows / std[:, None]
+    scaled[1:] /= np.broadcast_to(roughness, len(knots) - 2)[:, None]
+    return scaled.T @ scaled
+
+
+def adapted_roughness(curve: Curve, theta: np.ndarray) -> np.ndarray:
+    """Roughness (n - 2,) for each inner knot after a fit: larger where the curve was found to bend sharply.
+
+    One step towards a Student-t prior of TAIL degrees of freedom: gentle bends stay gentle, folds may fold.
+    """
+    forces = np.where(curve.column >= 0, theta[curve.column], 0.0)
+    rows, std = slope_changes(curve.knots, curve.crush_scale, curve.force_scale)
+    bend = (rows @ forces)[1:] / std[1:]
+    return np.sqrt((TAIL * ROUGHNESS**2 + bend**2) / (TAIL + 1.0))

@@ -1,0 +1,195 @@
+"""What is fitted: the parameters of a structure with its effects on some recordings, their priors and limits.
+
+Parameters stand in this order: forces at the curves' knots, then constants of elements and effects, then for each
+recording the nuisances (zero-offset errors of its outputs, slow error of its driven motions).
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...effects.effect import Addition
+from ...structure import Coefficient, Structure
+from ..observation.record import DRIVEN_MODES, ObservedRecord, outputs_of
+from .free_curve import ROUGHNESS, Curve, make_knots
+from .magnitudes import Magnitudes
+from .prior import Builder, Prior
+from .terms import Link, Term
+
+FREE, DRIVEN, FIXED = 0, 1, 2
+"""How a body moves: by forces, as its channels say, or not at all. The compiled passes know these codes."""
+
+
+class Layout(NamedTuple):
+    """A fit's parameters and what they mean."""
+
+    structure: Structure
+    links: tuple[Link, ...]
+    bodies: tuple[str, ...]  # the structure's, then attached ones
+    kind: np.ndarray  # (b,) FREE, DRIVEN or FIXED
+    outputs: tuple
+    knots: int  # parameters that are forces at knots
+    common: int  # parameters before the nuisances
+    size: int
+    terms: tuple[Term, ...]  # of every addition, in their order
+    attached: dict[str, int]  # channel of an attached body -> its body
+    offsets: tuple[int, ...]  # per record: first of its outputs' zero-offset errors
+    modes: tuple[dict[int, int], ...]  # per record: driven body -> first of its modes
+    prior: Prior
+    start: np.ndarray  # (p,)
+    names: tuple[str, ...]  # of the common parameters after the knots
+
+    def term(self, addition: Addition) -> Term:
+        """That of an addition with the same effect and target: a model has no effect twice on one target."""
+        return next(term for term in self.terms if term.addition.key == addition.key)
+
+
+def make_layout(
+    structure: Structure, records: Sequence[ObservedRecord], magnitudes: Magnitudes, additions: Sequence[Addition],
+    roughness: Mapping[str, np.ndarray] | None = None,
+) -> Layout:  # fmt: skip
+    """roughness: of curves, by their link's name, where it is not the usual one (`free_curve.adapted_roughness`)."""
+    roughness = roughness or {}
+    b = Builder()
+    index = structure.body_index
+    bodies = [body.name for body in structure.bodies]
+    kind = [FREE if body.free else DRIVEN if body.driven else FIXED for body in structure.bodies]
+    curves: list[Curve | None] = []
+    for k, element in enumerate(structure.elements):
+        wanted = element.stiffness.estimated and element.stiffness.shape == "curve"
+        curves.append(_element_curve(b, k, element, magnitudes, roughness) if wanted else None)
+    attached, touching = {}, []
+    for addition in additions:
+        if addition.effect.attaches_body:
+            if addition.target not in attached:
+                attached[addition.target] = len(bodies)
+                bodies.append(addition.target)
+                kind.append(DRIVEN)
+            if addition.touches:
+                knots, crush = magnitudes.touching(addition)
+                force = magnitudes.host_force(addition)
+                name = _touch_name(addition)
+                curve = b.curve(name, knots, crush, force, roughness.get(name, ROUGHNESS), 0.0)
+                touching.append((addition, curve))
+    knots = len(b.start)
+    links, terms = [], []
+    for k, element in enumerate(structure.elements):
+        links.append(_element_link(b, k, element, index, curves[k], magnitudes, additions, terms))
+    starts = [record.initial_displacement for record in records]
+    for addition in additions:
+        own = addition.effect.own_link(addition, index, starts)
+        if own is not None:
+            terms.append(_term(b, addition, magnitudes))
+            stiffness = terms[-1].coefficient
+            links.append(Link(addition.target, own.ends, own.ends, own.tension, constant=stiffness, origin=own.origin))
+    for addition, curve in touching:
+        links.append(
+            Link(
+                _touch_name(addition),
+                ends=(index[addition.touches], index[addition.host]),
+                crush_ends=(index[addition.touches], attached[addition.target]),
+                tension=True,
+                curve=curve,
+                damping=b.add(f"{_touch_name(addition)}.damping", 0.0, magnitudes.touching_damping(addition), low=0.0),
+            )
+        )
+    placed = [term.addition for term in terms]
+    terms += [_term(b, one, magnitudes) for one in additions if not any(one is other for other in placed)]
+    terms.sort(key=lambda term: next(k for k, addition in enumerate(additions) if addition is term.addition))
+    common = len(b.start)
+    outputs = outputs_of(structure)
+    offsets, modes = [], []
+    for r, record in enumerate(records):
+        offsets.append(len(b.start))
+        for q in range(len(outputs)):
+            b.add("offset", 0.0, max(record.offset_std[q], 1e-9))
+        modes.append(_modes(b, structure, record, attached))
+    return Layout(
+        structure, tuple(links), tuple(bodies), np.array(kind), outputs, knots, common, len(b.start), tuple(terms),
+        attached, tuple(offsets), tuple(modes), b.prior(), np.array(b.start), tuple(b.names[knots:common]),
+    )  # fmt: skip
+
+
+def _touch_name(addition: Addition) -> str:
+    return f"{addition.touches}-{addition.target}"
+
+
+def _element_curve(b: Builder, k: int, element, magnitudes: Magnitudes, roughness: Mapping[str, np.ndarray]) -> Curve:
+    low, high = magnitudes.crush_range[k]
+    crush = magnitudes.crush[k]
+    one_way = not element.tension
+    knots = make_knots(low, high, crush, magnitudes.cells, tension=not one_way)
+    return b.curve(element.name, knots, crush, magnitudes.force[k], roughness.get(element.name, ROUGHNESS))
+
+
+def _constant(b: Builder, name: str, coefficient: Coefficient, std: float) -> int:
+    low, high = coefficient.min, coefficient.max
+    return b.add(name, min(max(std * 0.1, low), high), std, low=low, high=high)
+
+
+def _element_link(b, k, element, index, curve, magnitudes, additions, terms) -> Link:
+    stiffness, damping = element.stiffness, element.damping
+    constant = rate = None
+    if stiffness.estimated and curve is None:
+        constant = _constant(b, f"{element.name}.stiffness", stiffness, 3.0 * magnitudes.stiffness[k])
+    if damping.estimated:
+        rate = _constant(b, f"{element.name}.damping", damping, magnitudes.force[k] / magnitudes.rate[k])
+    here = [_term(b, a, magnitudes) for a in additions if a.effect.acts_on == "element" and a.target == element.name]
+    terms += here
+    a, c = (index[end] for end in element.between)
+    return Link(
+        element.name,
+        ends=(a, c),
+        crush_ends=(-1, -1) if element.displacement else (a, c),
+        tension=element.tension and not any(term.addition.effect.compression_only for term in here),
+        damper_pulls=element.damper_pulls,
+        curve=curve,
+        constant=constant,
+        known_stiffness=stiffness.value,
+        damping=rate,
+        known_damping=0.0 if damping.estimated else damping.value,
+        unloading=element.unloading,
+        displacement=element.displacement,
+        velocity=element.velocity,
+        terms=tuple(here),
+    )
+
+
+def _term(b: Builder, addition: Addition, magnitudes: Magnitudes) -> Term:
+    """An effect's parameters: its coefficient, and the logarithms of its shape constants."""
+    effect = addition.effect
+    std = magnitudes.coefficient(addition)
+    start = addition.coefficient if addition.coefficient is not None else 0.0
+    low = effect.lowest(magnitudes, addition)
+    start = min(max(start, low), effect.high)
+    coefficient = b.add(f"{effect.name} {addition.target}", start, std, low=low, high=effect.high)
+    shapes = {}
+    for name, shape in effect.shapes.items():
+        unit = magnitudes.largest_crush(addition.target) if shape.of_crush else 1.0
+        low, high = np.log(shape.low * unit), np.log(shape.high * unit)
+        start = np.log(addition.shapes[name])
+        shapes[name] = b.add(
+            f"{effect.name} {addition.target} {name}",
+            start,
+            (high - low) / np.sqrt(12.0),
+            0.5 * (low + high),
+            low,
+            high,
+        )
+    return Term(addition, coefficient, shapes)
+
+
+def _modes(b: Builder, structure: Structure, record: ObservedRecord, attached: dict[str, int]) -> dict[int, int]:
+    """Mean and slow cosines of each driven channel's noise; white noise spreads its variance evenly over them."""
+    found = {}
+    driven = [(k, body.acceleration) for k, body in enumerate(structure.bodies) if body.driven]
+    samples = len(record.at)
+    for k, channels in driven + [(k, (channel,)) for channel, k in attached.items()]:
+        noise = np.sqrt(sum(record.signals[c].noise ** 2 for c in channels)) / len(channels)
+        offset = np.sqrt(sum(record.signals[c].offset_std ** 2 for c in channels)) / len(channels)
+        found[k] = len(b.start)
+        b.add("mode", 0.0, max(np.hypot(offset, noise / np.sqrt(samples)), 1e-9))
+        for _ in range(DRIVEN_MODES):
+            b.add("mode", 0.0, max(noise * np.sqrt(2.0 / samples), 1e-9))
+    return found

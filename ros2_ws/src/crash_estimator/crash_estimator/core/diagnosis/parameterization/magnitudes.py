@@ -1,0 +1,152 @@
+"""Orders of magnitude, from the measured motion: what priors, knots and starting points are scaled by.
+
+They are the same for a structure and for every candidate that is added to it, so that evidences compare.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...effects.effect import Addition, ElementMotion
+from ...structure import Element, Structure
+from ..observation.record import ObservedRecord, outputs_of
+from ..observation.trajectory import Trajectory, element_motion, integrate, measured_trajectory
+from .free_curve import make_knots
+
+SHORTEST_CRUSH = 0.03
+SHORTEST_SHARE = 0.15
+"""An element that is hardly crushed gets this crush scale (m, or share of the largest crush in the structure, if that
+is less), or its scale of stiffness becomes absurd."""
+
+
+class Magnitudes(NamedTuple):
+    structure: Structure
+    records: Sequence[ObservedRecord]
+    measured: tuple[Trajectory, ...]
+    body_force: np.ndarray  # (b,) N, largest; inf for a driven body
+    crush_range: np.ndarray  # (e, 2) m, lowest and highest
+    rate: np.ndarray  # (e,) m/s, largest while it may carry
+    crush: np.ndarray  # (e,) m, scale of its crush
+    force: np.ndarray  # (e,) N, largest
+    stiffness: np.ndarray  # (e,) N/m
+    cells: int  # of a curve over its crush scale
+    shortest_crush: float  # m
+
+    def element(self, name: str) -> int:
+        return [e.name for e in self.structure.elements].index(name)
+
+    def largest_crush(self, element: str) -> float:
+        return max(float(self.crush_range[self.element(element), 1]), 1e-4)
+
+    def crushed_elements(self) -> list[Element]:
+        """Elements that are crushed at all: of the others nothing can be told."""
+        return [e for k, e in enumerate(self.structure.elements) if self.crush_range[k, 1] > 0.0]
+
+    def coefficient(self, addition: Addition) -> float:
+        """Prior standard deviation of an addition's coefficient."""
+        size = addition.effect.size
+        return addition.effect.prior_std(self, addition) if size is None else size
+
+    def motion(self, record: int, element: int) -> ElementMotion:
+        """Measured motion of an element while it may carry."""
+        motion = element_motion(self.structure, self.records[record], self.measured[record], element)
+        if not self.structure.elements[element].tension:
+            apart = motion.crush <= 0.0
+            motion = motion._replace(rate=np.where(apart, 0.0, motion.rate), crush=np.where(apart, 0.0, motion.crush))
+        return motion
+
+    def touching(self, addition) -> tuple[np.ndarray, float]:
+        """Knots and crush scale of the curve between an attached body and the one that it pushes."""
+        body = self.structure.body_index[addition.touches]
+        low, high = 0.0, 0.0
+        for record, measured in zip(self.records, self.measured):
+            x = measured.x[:, body] - attached_motion(self.structure, record, addition)[2]
+            low, high = min(low, float(x.min())), max(high, float(x.max()))
+        crush = max(high - low, self.shortest_crush)
+        return make_knots(low, high, crush, self.cells, True), crush
+
+    def touching_damping(self, addition) -> float:
+        """Scale of a damper beside that curve, N s/m."""
+        body, rate = self.structure.body_index[addition.touches], 1e-3
+        for record, measured in zip(self.records, self.measured):
+            v = measured.v[:, body] - attached_motion(self.structure, record, addition)[1]
+            rate = max(rate, float(np.abs(v).max()))
+        return self.host_force(addition) / rate
+
+    def host_force(self, addition) -> float:
+        index = self.structure.body_index
+        return min(self.body_force[index[addition.host]], self.body_force[index[addition.touches]])
+
+
+def attached_motion(
+    structure: Structure, record: ObservedRecord, addition
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(g,) acceleration, velocity and displacement of the body behind an unused channel."""
+    a = record.signals[addition.target].on_grid
+    x0, v0 = attached_start(structure, record, addition)
+    v, x = integrate(record.dt, a[:, None], np.array([v0]), np.array([x0]))
+    return a, v[:, 0], x[:, 0]
+
+
+def attached_start(structure: Structure, record: ObservedRecord, addition) -> tuple[float, float]:
+    """Initial displacement and velocity: stated for the channel's body, else those of the body that it sits on."""
+    carrier = record.test.channels[record.test.index(addition.target)].body
+    host = structure.body_index[addition.taken_from or addition.host]
+    if structure.bodies[host].fixed:
+        host = next((k for k, body in enumerate(structure.bodies) if body.free), host)
+    x0 = record.test.initial_displacement.get(carrier, record.initial_displacement[host])
+    v0 = record.test.initial_velocity.get(carrier, record.initial_velocity[host])
+    return float(x0), float(v0)
+
+
+def measure_magnitudes(
+    structure: Structure, records: Sequence[ObservedRecord], cells: int, motions: Sequence[Trajectory] | None = None,
+) -> Magnitudes:  # fmt: skip
+    """motions: where the measured accelerations are known to err, a better idea of how the bodies move."""
+    measured = tuple(motions or (measured_trajectory(structure, record) for record in records))
+    outputs = outputs_of(structure)
+    body_force = np.full(len(structure.bodies), np.inf)
+    for k, body in enumerate(structure.bodies):
+        rows = [q for q, output in enumerate(outputs) if output.body == k]
+        if rows:
+            inertia = body.mass if body.free else 1.0
+            body_force[k] = inertia * max(_peak(record, rows) for record in records)
+    elements = range(len(structure.elements))
+    crush_range, rate = np.zeros((len(elements), 2)), np.full(len(elements), 1e-3)
+    for k in elements:
+        for record, trajectory in zip(records, measured):
+            motion = element_motion(structure, record, trajectory, k)
+            crush_range[k, 0] = min(crush_range[k, 0], motion.crush.min())
+            crush_range[k, 1] = max(crush_range[k, 1], motion.crush.max())
+            touches = structure.elements[k].tension | (motion.crush > 0.0)
+            rate[k] = max(rate[k], np.abs(motion.rate[touches]).max(initial=0.0))
+    ends = structure.ends
+    force = np.array([min(body_force[ends[k, 0]], body_force[ends[k, 1]]) for k in elements])
+    force = np.where(np.isfinite(force), force, body_force[np.isfinite(body_force)].max())
+    reach = crush_range[:, 1] - crush_range[:, 0]
+    shortest = min(SHORTEST_CRUSH, SHORTEST_SHARE * float(reach.max(initial=0.0))) or SHORTEST_CRUSH
+    crush = np.maximum(reach, shortest)
+    stiffness = force / crush
+    return Magnitudes(
+        structure,
+        records,
+        measured,
+        body_force,
+        crush_range,
+        rate,
+        crush,
+        force,
+        stiffness,
+        cells,
+        shortest,
+    )
+
+
+def _peak(record: ObservedRecord, rows: list[int]) -> float:
+    """Largest mean over a bin of a body's outputs."""
+    sums, found = np.zeros((record.bins, 2)), record.measured[:, rows]
+    known = np.isfinite(found)
+    each = np.stack([np.where(known, found, 0.0).sum(axis=1), known.sum(axis=1)], axis=1)
+    np.add.at(sums, record.bin[record.at], each)
+    return float(np.abs(sums[:, 0] / np.maximum(sums[:, 1], 1.0)).max())

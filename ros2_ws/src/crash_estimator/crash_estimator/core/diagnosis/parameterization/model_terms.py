@@ -1,0 +1,30 @@
+"""Effects of a model file as additions of a fit."""
+
+from collections.abc import Mapping
+
+from ...effects.effect import Addition, Effect
+from ...effects.targets import checked
+from ...structure import EffectSpec, Structure
+from .magnitudes import Magnitudes
+
+
+def additions_of(structure: Structure, magnitudes: Magnitudes, effects: Mapping[str, Effect]) -> tuple[Addition, ...]:
+    """Raises ModelError where a model names an effect or a target that there is not."""
+    return tuple(_addition(structure, magnitudes, spec, effects) for spec in structure.effects)
+
+
+def _addition(
+    structure: Structure, magnitudes: Magnitudes, spec: EffectSpec, effects: Mapping[str, Effect]
+) -> Addition:
+    effect = checked(structure, spec, effects, magnitudes.records[0].test)
+    shapes = {
+        name: shape.starts[len(shape.starts) // 2] * (magnitudes.largest_crush(spec.target) if shape.of_crush else 1.0)
+        for name, shape in effect.shapes.items()
+    } | dict(spec.shape)
+    coefficient = spec.coefficient
+    if coefficient is not None:
+        coefficient = effect.unstated(coefficient, **shapes)
+    host = spec.host
+    if effect.attaches_body and host is None:
+        host = next(body.name for body in structure.bodies if body.free)
+    return Addition(effect, spec.target, shapes, coefficient, host, spec.touches, spec.taken_from, spec.variant)

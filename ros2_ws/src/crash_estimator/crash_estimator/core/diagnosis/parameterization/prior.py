@@ -1,0 +1,57 @@
+"""Parameters of a fit, collected one by one with their priors, limits and starts."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .free_curve import Curve, prior_precision
+
+
+class Prior(NamedTuple):
+    mean: np.ndarray  # (p,)
+    precision: np.ndarray  # (p, p)
+    low: np.ndarray  # (p,)
+    high: np.ndarray  # (p,)
+
+
+class Builder:
+    """Collects parameters one by one."""
+
+    def __init__(self):
+        self.mean: list[float] = []
+        self.std: list[float] = []
+        self.low: list[float] = []
+        self.high: list[float] = []
+        self.start: list[float] = []
+        self.names: list[str] = []
+        self.blocks: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def add(self, name: str, start: float, std: float, mean=0.0, low=-np.inf, high=np.inf) -> int:
+        for column, item in zip(
+            (self.names, self.start, self.std, self.mean, self.low, self.high), (name, start, std, mean, low, high)
+        ):
+            column.append(item)
+        return len(self.start) - 1
+
+    def curve(
+        self,
+        name: str,
+        knots: np.ndarray,
+        crush: float,
+        force: float,
+        roughness: np.ndarray | float,
+        start: float = 1.0,
+    ) -> Curve:
+        """start: share of the straight line to the force scale that it begins with."""
+        inner = knots != 0.0
+        column = np.full(len(knots), -1)
+        column[inner] = [self.add(name, start * force * x / crush, np.inf) for x in knots[inner]]
+        precision = prior_precision(knots, crush, force, roughness)
+        self.blocks.append((column[inner], precision[np.ix_(inner, inner)]))
+        return Curve(knots, column, crush, force)
+
+    def prior(self) -> Prior:
+        precision = np.diag(1.0 / np.array(self.std) ** 2)
+        for columns, block in self.blocks:
+            precision[np.ix_(columns, columns)] += block
+        return Prior(np.array(self.mean), precision, np.array(self.low), np.array(self.high))

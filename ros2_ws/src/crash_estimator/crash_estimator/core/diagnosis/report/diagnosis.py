@@ -1,0 +1,100 @@
+"""Which physical effect is missing: the answer, from a structure and one or more recordings of it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from crash_replay.recording import Recording
+
+from ...effects import EFFECTS
+from ...effects.effect import Effect
+from ...structure import ModelError, Structure
+from ..observation.record import observe
+from ..residuals.misfit_windows import MisfitWindow, misfit_windows
+from ..residuals.residuals import free_run, noise_floor
+from ..residuals.score_test import Drift, drift_of
+from ..selection.assumptions import SelectionPath, select
+from ..selection.fitted_model import Model
+from .model_effects import structure_with
+from .ranking import Ranked, StepReport, ranking_of, step_of
+from .verdict_text import MOST_AT_ONCE, verdict_text
+
+
+@dataclass(frozen=True)
+class Rms:
+    """Root mean square of measured minus predicted over all outputs, m/s^2; None where it is not known."""
+
+    before: float
+    after: float
+    noise_floor: float | None = None
+    unit: str = "m/s^2"
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What was found; `as_json` is the contract of `diagnose --json`."""
+
+    verdict: str  # effect_missing, adequate or unexplained
+    text: str  # one readable line
+    residual_rms: Rms  # of the fit
+    free_run_rms: Rms  # of a simulation from the initial motion alone
+    ranking: tuple[Ranked, ...]  # of the first round, best first
+    steps: tuple[StepReport, ...]  # effects added, in order
+    remaining: tuple[Ranked, ...]  # what was left of the candidates in the last round
+    misfit: tuple[MisfitWindow, ...]  # of the structure as it was given
+    misfit_after: tuple[MisfitWindow, ...]
+    structure: Structure  # with the effects that were added
+    models: tuple[Model, ...]  # as given, then after each step
+
+    def as_json(self) -> dict:
+        return {
+            "verdict": self.verdict,
+            "text": self.text,
+            "residual_rms": vars(self.residual_rms),
+            "free_run_rms": {k: v for k, v in vars(self.free_run_rms).items() if v is not None},
+            "ranking": [ranked.as_json() for ranked in self.ranking],
+            "steps": [step.as_json() for step in self.steps],
+            "misfit": [window._asdict() for window in self.misfit],
+            "misfit_after": [window._asdict() for window in self.misfit_after],
+        }
+
+
+def diagnose(
+    structure: Structure, recordings: Sequence[Recording], effects: Mapping[str, Effect] = EFFECTS
+) -> Diagnosis:
+    """Compare a structure (with the effects that it has) with recordings of it, and name what is missing.
+
+    Raises ModelError or RecordingError, one line, where the data or the model is at fault.
+    """
+    if not recordings:
+        raise ModelError("a diagnosis needs at least one recording")
+    path = select(structure, [observe(structure, recording) for recording in recordings], effects)
+    return _answer(structure, path, drift_of(path.as_recorded))
+
+
+def _answer(structure: Structure, path: SelectionPath, drift: Drift) -> Diagnosis:
+    steps, final, present = path.steps, path.final, path.present
+    first = steps[0].before
+    models = tuple(step.before for step in steps)
+    if models[-1] is not final:
+        models = (*models, final)
+    added = final.additions[present:]
+    runs = [free_run(model.fit).rms for model in models]
+    pairs = zip(steps, models, models[1:], zip(runs, runs[1:], strict=False), strict=False)  # the last has no successor
+    reports = tuple(step_of(*each, final) for each in pairs)[: len(added)]
+    explained = final.white and drift.constant and len(added) <= MOST_AT_ONCE
+    verdict = ("effect_missing" if added else "adequate") if explained else "unexplained"
+    floor = noise_floor(first.fit.layout, first.records)
+    ranking = ranking_of(steps[0])
+    return Diagnosis(
+        verdict=verdict,
+        text=verdict_text(verdict, reports, ranking, first, final, floor, drift, path.structure is structure),
+        residual_rms=Rms(first.residuals.rms, final.residuals.rms, floor),
+        free_run_rms=Rms(runs[0], runs[-1]),
+        ranking=ranking,
+        steps=reports,
+        remaining=ranking_of(steps[-1]),
+        misfit=misfit_windows(first.fit.layout, first.records, first.residuals),
+        misfit_after=misfit_windows(final.fit.layout, final.records, final.residuals),
+        structure=structure_with(path.structure, added, reports),
+        models=models,
+    )

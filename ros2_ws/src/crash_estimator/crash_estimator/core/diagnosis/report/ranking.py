@@ -1,0 +1,176 @@
+"""The ranking and the steps of a diagnosis, in the terms of its contract."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from crash_replay.conditioning import cfc_filter
+
+from ..mechanics.masses import balance_of
+from ..observation.noise_inflation import CFC, SLOWEST
+from ..output_error.gauss_newton import Fit
+from ..parameterization.experiment import Experiment
+from ..parameterization.terms import Term
+from ..residuals.residuals import analyse, noise_floor
+from ..selection.candidate_fits import CandidateFit
+from ..selection.fitted_model import Model
+from ..selection.selection_step import SelectionStep, fit_stated
+from ..selection.thresholds import THRESHOLDS
+
+ACTS = 0.05
+"""A barrier's force and inertias are compared while the force is above this share of its peak."""
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One candidate."""
+
+    effect: str
+    target: str
+    coefficient: float
+    std: float
+    unit: str
+    evidence: float  # nats gained over the model without it
+    explained: float  # share of the residual's variance that it removes
+    identifiable: bool
+    confounded_with: tuple[str, ...]  # "effect on target"
+    shape: dict[str, float] = field(default_factory=dict)  # shape constants found
+    fitted: bool = True  # False: screened only; its evidence is an estimate
+
+    @property
+    def name(self) -> str:
+        return f"{self.effect} on {self.target}"
+
+    def as_json(self) -> dict:
+        return vars(self) | {"confounded_with": list(self.confounded_with)}
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """One effect added, with the fit before and after it."""
+
+    effect: str
+    target: str
+    coefficient: float
+    std: float
+    unit: str
+    evidence: float
+    explained: float
+    shape: dict[str, float]
+    residual_rms: dict
+    free_run_rms: dict
+    force_explained: dict[str, dict]  # per measured force: share explained by the inertias, before and after
+
+    def as_json(self) -> dict:
+        return vars(self)
+
+
+def stated(term: Term, fitted: Fit) -> tuple[float, float, dict[str, float]]:
+    """An effect's coefficient as the literature states it, its standard deviation, and its shape constants.
+
+    A factor's coefficient may be a power of what was fitted, known to a factor: then the standard deviation s of its
+    logarithm is what propagates, and c (exp(s) - 1), the upper side, stands for both.
+    """
+    theta, covariance = fitted.theta, fitted.covariance
+    shapes = {name: float(np.exp(theta[p])) for name, p in term.shapes.items()}
+    effect, c = term.addition.effect, float(theta[term.coefficient])
+    if not effect.restated:
+        return c, float(np.sqrt(covariance[term.coefficient, term.coefficient])), shapes
+    parameters = [term.coefficient, *term.shapes.values()]
+
+    def value(moved: np.ndarray) -> float:
+        return effect.stated(moved[0], **dict(zip(shapes, np.exp(moved[1:]), strict=True)))
+
+    at = theta[parameters]
+    steps = np.maximum(1e-4 * np.abs(at), 1e-12)
+    each = zip(steps, np.eye(len(at)), strict=True)
+    gradient = [(value(at + s * e) - value(at - s * e)) / (2.0 * s) for s, e in each]
+    if not np.isfinite(gradient).all():  # next to nothing, stated as one over it
+        return value(at), np.inf, shapes
+    variance = float(np.array(gradient) @ covariance[np.ix_(parameters, parameters)] @ np.array(gradient))
+    with np.errstate(over="ignore"):  # of next to nothing, known to many powers of ten: inf
+        factor = np.expm1(np.sqrt(max(variance, 0.0)) / abs(value(at)))
+    return value(at), float(abs(value(at)) * factor), shapes
+
+
+def ranking_of(step: SelectionStep) -> tuple[Ranked, ...]:
+    """Candidates that gain anything, and at least the best three."""
+    shown = [one for k, one in enumerate(step.candidates) if one.gain > 0.0 or k < 3]
+    return tuple(_ranked(one, step.before, shown) for one in shown)
+
+
+def _ranked(one: CandidateFit, before: Model, shown: list[CandidateFit]) -> Ranked:
+    addition = one.addition
+    effect, target = addition.key
+    counts = one.fit and one.gain > THRESHOLDS.gain
+    fitted = [other for other in shown if other is not one and other.fit] if counts else []
+    rivals = tuple(" on ".join(other.addition.key) for other in fitted if _confounded(one, other))
+    if one.fit is None:
+        cost = before.fit.cost
+        explained = min(max(2.0 * one.gain / cost, 0.0), 1.0) if cost > 0.0 else 0.0
+        value, std, shape = one.screened.coefficient, one.screened.std, dict(addition.shapes)
+        if addition.coefficient is not None:
+            value, std = addition.coefficient, np.inf
+        elif addition.effect.restated:
+            value, std = addition.effect.stated(value, **addition.shapes), np.inf
+    else:
+        left = analyse(one.fit).mean_square
+        explained = float(np.clip(1.0 - left / before.residuals.mean_square, 0.0, 1.0))
+        value, std, shape = stated(one.fit.layout.term(addition), one.fit)
+    return Ranked(
+        effect, target, value, std, addition.effect.unit, float(one.gain), explained, not rivals, rivals, shape,
+        one.fit is not None,
+    )  # fmt: skip
+
+
+def _confounded(one: CandidateFit, other: CandidateFit) -> bool:
+    """Whether the recordings hardly tell two fitted candidates apart: with or without what is held against a mass."""
+    gains = [(f.gain, f.gain + f.addition.effect.log_prior_odds_against(f.fit.layout.structure)) for f in (one, other)]
+    return any(abs(a - b) < THRESHOLDS.confounded for a, b in zip(*gains, strict=True))
+
+
+def step_of(
+    step: SelectionStep, before: Model, after: Model, free_run_rms: tuple[float, float], final: Model
+) -> StepReport:
+    """free_run_rms: of the two models' free runs; final: the model with all that was added."""
+    best = step.candidates[0]
+    fitted = fit_stated(step, final)
+    value, std, shape = stated(fitted.layout.term(best.addition), fitted)
+    floor = noise_floor(before.fit.layout, before.records)
+    changed = after.fit if fitted is final.fit else fitted
+    return StepReport(
+        *best.addition.key, value, std, best.addition.effect.unit, float(best.gain),
+        explained=float(np.clip(1.0 - after.residuals.mean_square / before.residuals.mean_square, 0.0, 1.0)),
+        shape=shape,
+        residual_rms={
+            "before": before.residuals.rms, "after": after.residuals.rms, "noise_floor": floor, "unit": "m/s^2",
+        },
+        free_run_rms={"before": free_run_rms[0], "after": free_run_rms[1]},
+        force_explained=_force_explained(step.before.fit, changed),
+    )  # fmt: skip
+
+
+def _force_explained(before: Fit, after: Fit) -> dict[str, dict]:
+    """Share of the measured force's variance that the measured accelerations of all masses explain."""
+    layout = before.layout
+    fixed = [q for q, output in enumerate(layout.outputs) if output.fixed]
+    measured = {output.body for output in layout.outputs if not output.fixed}
+    if len(fixed) != 1 or measured != {k for k, body in enumerate(layout.structure.bodies) if body.free}:
+        return {}
+    if max(record.period for record in before.problem.records) * SLOWEST > 1.0:
+        return {}
+    shares = [
+        float(np.mean([_balance(experiment, fitted.theta, fixed[0]) for experiment in fitted.problem.experiments]))
+        for fitted in (before, after)
+    ]
+    return {layout.outputs[fixed[0]].channel: dict(zip(("before", "after"), shares, strict=True))}
+
+
+def _balance(experiment: Experiment, theta: np.ndarray, row: int) -> float:
+    """1 - var(F + sum M a) / var(F), below CFC 60, while the force acts."""
+    record = experiment.record
+    force = np.nan_to_num(record.measured[:, row])
+    predicted = balance_of(experiment, theta)[record.at]
+    force, rest = (cfc_filter(values, record.period, CFC) for values in (force, force - predicted))
+    acts = np.abs(force) > ACTS * np.abs(force).max()
+    return max(float(1.0 - np.var(rest[acts]) / np.var(force[acts])), 0.0)

@@ -1,0 +1,108 @@
+"""Whether a residual is at the noise floor: its power in frequency bands, channel by channel.
+
+The cosine transform of white noise of n samples has n independent coefficients of the same variance; the mean
+square of m of them over the noise variance, itself known from s samples, has the F distribution with m and s
+degrees of freedom. A missing effect leaves its power in a few low bands, where few coefficients hide little.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.fft import dct
+from scipy.special import fdtrc
+
+EDGES = (0.0, 60.0, 120.0, 240.0, 500.0, 1000.0, 2000.0, np.inf)
+"""Hz."""
+
+SIGNIFICANT = 0.001
+"""Probability that white noise fails in any band of any channel: a wrong alarm once in a thousand tests; what a missing
+effect leaves is mostly far beyond it."""
+
+ABSORBING = (0.0, 60.0, 120.0, 240.0, 500.0)
+"""Hz: what is fitted moves slowly; above, a fit absorbs next to nothing."""
+
+LEAST_LEFT = 1.0
+"""Degrees of freedom: where a fit leaves fewer, there is nothing to tell from."""
+
+CLIP = 4.5
+"""Standard deviations: single samples beside a jump of the force are no missing effect."""
+
+
+class Band(NamedTuple):
+    """The worst band of one output of one record."""
+
+    record: int
+    output: int
+    low: float  # Hz
+    high: float  # Hz
+    ratio: float  # power over the noise's
+
+
+class BandTest(NamedTuple):
+    white: bool
+    probability: float  # that white noise looks as bad, over all bands
+    worst: Band
+
+
+class Absorbed(NamedTuple):
+    """What a fit leaves of noise in one output of one record: residual and derivative, whitened, means over bins."""
+
+    residual: np.ndarray  # (bins,)
+    root: np.ndarray  # (bins, p) its derivative times a root of the parameters' covariance
+    period: float  # s
+
+
+def band_test(residuals, noise_samples, periods) -> BandTest:
+    """residuals: per record (n, q) in standard deviations of the noise, NaN where not valid; noise_samples (q,) per
+    record; periods: s between samples, per record."""
+    found = []
+    for r, (residual, samples, period) in enumerate(zip(residuals, noise_samples, periods)):
+        for q in range(residual.shape[1]):
+            z = residual[:, q]
+            power, bands = _bands(z[np.isfinite(z)], period, EDGES)
+            for low, high, inside in bands:
+                ratio = float(power[inside].mean())
+                p = _probability(np.count_nonzero(inside), samples[q], ratio)
+                found.append((p, Band(r, q, low, min(high, 0.5 / period), ratio)))
+    return _worst_of(found)
+
+
+def band_test_of_fit(records: Sequence[Sequence[Absorbed]], noise_samples) -> BandTest:
+    """The same of a fit's residual, sharper in the low bands: what the fit has absorbed there is no longer expected.
+
+    The residual of the right model has the covariance C = I - J P J', with the derivative J and the posterior
+    covariance P of the parameters. The sum of its squares in a band has the mean m = tr C_B and, nearly, the
+    distribution of m / v chi^2 with v = m^2 / tr C_B^2 degrees of freedom (Satterthwaite).
+    """
+    found = []
+    for r, (outputs, samples) in enumerate(zip(records, noise_samples)):
+        for q, one in enumerate(outputs):
+            power, bands = _bands(one.residual, one.period, ABSORBING)
+            root = dct(one.root, norm="ortho", axis=0)
+            for low, high, inside in bands:
+                covariance = np.eye(np.count_nonzero(inside)) - root[inside] @ root[inside].T
+                mean, square = float(np.trace(covariance)), float((covariance**2).sum())
+                if mean < LEAST_LEFT:
+                    continue
+                ratio = float(power[inside].sum()) / mean
+                found.append((_probability(mean**2 / square, samples[q], ratio), Band(r, q, low, high, ratio)))
+    return _worst_of(found)
+
+
+def _bands(z: np.ndarray, period: float, edges: Sequence[float]):
+    """Power of the cosine transform, and the bands (low, high, coefficients inside) that have any."""
+    power = dct(np.clip(z, -CLIP, CLIP), norm="ortho") ** 2
+    frequency = np.arange(len(z)) / (2.0 * len(z) * period)
+    bands = [(low, high, (frequency >= low) & (frequency < high)) for low, high in zip(edges, edges[1:])]
+    return power, [band for band in bands if band[2].any()]
+
+
+def _probability(freedom: float, samples: float, ratio: float) -> float:
+    return float(fdtrc(freedom, min(float(samples), 1e6), ratio))
+
+
+def _worst_of(found: Sequence[tuple[float, Band]]) -> BandTest:
+    least = min(found, key=lambda one: one[0], default=(1.0, Band(0, 0, 0.0, 0.0, 0.0)))
+    probability = float(-np.expm1(len(found) * np.log1p(-min(least[0], 1.0 - 1e-12))))
+    return BandTest(probability > SIGNIFICANT, probability, least[1])

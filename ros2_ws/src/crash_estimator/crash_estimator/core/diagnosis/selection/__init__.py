@@ -1,0 +1,1 @@
+"""Model selection: candidates, score screening, fits, acceptance, forward selection, pairs, pruning."""

@@ -1,0 +1,52 @@
+"""When a fit is believed, when it is better than another one, and when what it adds counts."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..observation.record import ObservedRecord
+from ..output_error.gauss_newton import Fit
+from ..residuals.residuals import Residuals
+from .thresholds import THRESHOLDS
+
+
+def better(one, other) -> bool:
+    """Whether a fit of the same model (a `Model` each) in the same noise is a better one.
+
+    The evidence counts what a motion that has not settled would leave, to first order; of one that never settles, that
+    is less than it leaves itself. So both must say so.
+    """
+    more_likely = one.fit.evidence > other.fit.evidence + 1.0
+    return more_likely and one.residuals.mean_square < other.residuals.mean_square
+
+
+def settled(found: Fit, residuals: Residuals) -> bool:
+    """Whether what a fit takes its motion to leave, to first order, is about what that motion does leave.
+
+    An element that springs back hard can throw the motion about from one iteration to the next; then the cost, which
+    counts the defect as mended, says nothing. Above the noise, which its means over bins partly leave out, the two
+    agree but for the prior's share and for what is not linear: within a factor of two.
+    """
+    samples = sum(np.count_nonzero(np.isfinite(residual)) for residual in residuals.residual)
+    above = (residuals.mean_square - 1.0) * samples
+    return above < 2.0 * found.cost and found.cost < 2.0 * residuals.mean_square * samples
+
+
+def cost_of_nothing(records: Sequence[ObservedRecord]) -> float:
+    """Of predicting zero: a fit that leaves more has gone astray."""
+    return sum(float(np.nansum((record.measured / record.noise) ** 2)) for record in records)
+
+
+def share_removed(before: Residuals, after: Residuals) -> float:
+    """Of the mean square residual above that of the noise."""
+    return (before.mean_square - after.mean_square) / max(before.mean_square - 1.0, 1e-9)
+
+
+def explains_too_little(before: Residuals, after: Sequence[Residuals]) -> bool:
+    """Whether an addition that still leaves more than noise removes next to nothing, by each way of looking at it."""
+    return max(share_removed(before, one) for one in after) < THRESHOLDS.least_share
+
+
+def needed_gain(adds_to_white: bool) -> float:
+    """Nats that the next addition must gain."""
+    return THRESHOLDS.gain_beyond_white if adds_to_white else THRESHOLDS.gain

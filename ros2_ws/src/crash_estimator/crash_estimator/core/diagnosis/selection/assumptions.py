@@ -1,0 +1,141 @@
+"""The selection under other assumptions, where the first ones may be what is wrong: finer curves, dampers that push.
+
+A model file says neither how sharply a structure folds, nor, unless it is asked to, whether the damper beside a spring
+that carries compression only may pull until that is spent.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...effects.effect import Addition, Effect
+from ...structure import Structure
+from ..mechanics.linearization import linearise
+from ..observation.record import ObservedRecord
+from ..output_error.gauss_newton import Fit, fit
+from ..parameterization.experiment import experiments_of
+from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
+from ..parameterization.model_terms import additions_of
+from ..residuals.residuals import Residuals, analyse
+from .acceptance import share_removed
+from .fitted_model import Model, fit_model
+from .forward_selection import forward_selection
+from .pruning import up_to_the_least_error
+from .selection_step import SelectionStep
+from .thresholds import THRESHOLDS
+
+CELLS = 36
+"""Of a free curve over its crush scale: 1 cm of a crush of 0.4 m, the length of a fold of a longitudinal."""
+
+FINER_CELLS = 2 * CELLS
+
+
+class SelectionPath(NamedTuple):
+    """What a selection has found."""
+
+    structure: Structure  # as it was assumed
+    steps: list[SelectionStep]
+    final: Model
+    present: int  # additions that the structure had
+    as_recorded: Fit  # of the final model, in the sensors' noise
+
+    def rank(self) -> tuple[bool, float]:
+        """Of paths under different assumptions the largest is believed."""
+        return self.final.white, self.as_recorded.evidence
+
+
+def select(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
+    """The effects that a structure lacks. Raises ModelError where it names an effect that there is not."""
+    path = _with_curves_as_fine_as_needed(structure, records, effects)
+    pushing = never_pulling(structure)
+    if pushing is not structure and _may_be_explained_by(pushing, path, records):
+        path = max(path, _with_curves_as_fine_as_needed(pushing, records, effects), key=SelectionPath.rank)
+    return path
+
+
+def never_pulling(structure: Structure) -> Structure:
+    """The structure whose dampers never pull where their element carries compression only; itself where none can."""
+    if all(element.tension or not element.damper_pulls for element in structure.elements):
+        return structure
+    elements = (e if e.tension else replace(e, damper_pulls=False) for e in structure.elements)
+    return replace(structure, elements=tuple(elements))
+
+
+def _may_be_explained_by(pushing: Structure, path: SelectionPath, records: Sequence[ObservedRecord]) -> bool:
+    """Something is missing, and contacts that never pull would explain some of it.
+
+    Taken the wrong way, a damper that pulls looks like another effect.
+    """
+    final = path.final
+    if len(final.additions) == path.present and final.white:
+        return False
+    magnitudes = measure_magnitudes(pushing, records, CELLS)
+    samples = sum(record.bins * record.measured.shape[1] for record in records)
+    models = [step.before for step in path.steps]
+    for model in models if models[-1] is final else [*models, final]:
+        pulling = in_the_sensors_noise(model, records)
+        if not _contacts_pull(pulling):
+            continue
+        other = fit_model(magnitudes, records, model.additions).fit
+        misfit = 0.5 * max(pulling.cost - samples, 0.0)  # nats
+        if other.evidence > pulling.evidence + THRESHOLDS.gain + THRESHOLDS.least_share * misfit:
+            return True
+    return False
+
+
+def _contacts_pull(fitted: Fit) -> bool:
+    """Whether any does along the fitted motion; where none does, one that never pulls is the same."""
+    problem = fitted.problem
+    never = problem.layout._replace(links=tuple(replace(link, damper_pulls=False) for link in problem.layout.links))
+    pairs = zip(problem.experiments, experiments_of(never, problem.records), fitted.trajectories, strict=True)
+    for pulling, pushing, trajectory in pairs:
+        rows = [linearise(experiment, fitted.theta, trajectory).rows for experiment in (pulling, pushing)]
+        if not np.array_equal(*rows):
+            return True
+    return False
+
+
+def _with_curves_as_fine_as_needed(
+    structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]
+) -> SelectionPath:
+    magnitudes = measure_magnitudes(structure, records, CELLS)
+    present = additions_of(structure, magnitudes, effects)
+    steps, final = forward_selection(magnitudes, effects, present)
+    as_recorded = in_the_sensors_noise(final, records)
+    finer = measure_magnitudes(structure, records, FINER_CELLS)
+    if _wants_finer_curves(final, analyse(as_recorded), finer, len(present)):
+        finer_steps, finer_final = forward_selection(finer, effects, present)
+        fewer = len(finer_final.additions) < len(final.additions) or not final.white
+        if finer_final.white and fewer:
+            steps, final = finer_steps, finer_final
+            as_recorded = in_the_sensors_noise(final, records)
+    steps, reported = up_to_the_least_error(steps, final, len(present))
+    if reported is not final:
+        final, as_recorded = reported, in_the_sensors_noise(reported, records)
+    return SelectionPath(structure, steps, final, len(present), as_recorded)
+
+
+def _wants_finer_curves(final: Model, residuals: Residuals, finer: Magnitudes, present: int) -> bool:
+    """Whether folds of a curve that its cells are too wide for may be what is left, or what several effects stand for.
+
+    residuals: of the final model in the sensors' noise.
+    """
+
+    def refined(additions: Sequence[Addition]) -> Residuals:
+        return fit_model(finer, finer.records, additions).residuals
+
+    given, found = final.additions[:present], final.additions[present:]
+    if len(found) > 1 and any(refined((*given, one)).white for one in found):
+        return True
+    if final.white or residuals.mean_square >= THRESHOLDS.near_floor:
+        return False
+    sharper = refined(final.additions)
+    return sharper.white or share_removed(residuals, sharper) > THRESHOLDS.least_share
+
+
+def in_the_sensors_noise(model: Model, records: Sequence[ObservedRecord]) -> Fit:
+    """The model's fit; made again where that was in a larger noise."""
+    problem = model.fit.problem
+    return fit(problem.on(records), model.fit.point) if problem.noise_is_inflated else model.fit

@@ -1,0 +1,227 @@
+"""All candidates for one more addition: screened, the likely ones fitted, harder where none leaves only noise."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from ...effects.effect import Addition, Effect
+from ..output_error.continuation import (
+    FROM_MEASURED_MOTION,
+    FROM_SIMULATION,
+    LARGE_NOISE,
+    SLOW_CONTACT,
+    SMALL_STEPS,
+    Schedule,
+)
+from ..output_error.gauss_newton import MOST_ITERATIONS, Fit, equation_error_left, fit
+from ..output_error.problem import OutputErrorProblem, Point, embedding, make_problem
+from ..output_error.profile_likelihood import closer, profile
+from ..parameterization.magnitudes import Magnitudes
+from ..residuals.residuals import analyse
+from .candidates import candidates
+from .fitted_model import Model
+from .score_screening import Screened, screen, shortlist
+from .thresholds import THRESHOLDS
+
+
+class CandidateFit(NamedTuple):
+    """A candidate, and the model with it."""
+
+    addition: Addition
+    gain: float  # nats
+    fit: Fit | None  # None: only screened
+    screened: Screened | None = None
+
+
+def fit_candidates(
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, thorough: bool = False,
+    in_other_noise: Sequence[CandidateFit] = (), earlier: Sequence[CandidateFit] = (),
+) -> list[CandidateFit]:  # fmt: skip
+    """All candidates, best first; one for each effect and target.
+
+    thorough: try more of them, and harder, where none of the most likely ones leaves white noise. in_other_noise: what
+    was found with other noise, best first; its best fits are gone on from. earlier: what was found for the models
+    before this one.
+    """
+    additions = candidates(magnitudes, effects, model.additions)
+    given = magnitudes, model.records, model.additions, additions, model.roughness
+    by_fit = screen(*given, model.fit)
+    by_motion = [] if model.white else screen(*given)
+    short, long = THRESHOLDS.shortlist, THRESHOLDS.long_list
+    worth = [one for one in by_fit if one.gain > THRESHOLDS.worth_fitting]
+    search = _Search(magnitudes, model, by_fit)
+    search.from_motion(shortlist(by_motion, short))
+    search.from_model(shortlist(worth, short))
+    search.go_on_from([one for one in in_other_noise if one.fit][:short])
+    if thorough and model.residuals.mean_square < THRESHOLDS.near_floor:
+        # such an error bends the motion that all curves are fitted to, so that no linearisation tells what it would gain
+        bend = [a for a in additions if _bends_driven_motion(magnitudes, a)]
+        if model.white:  # to stand for what was added, one would have had to explain all alone
+            fitted = {one.addition.key for one in earlier if one.fit}
+            bend = [a for a in bend if a.key not in fitted]
+        search.from_motion(Screened(a, 0.0, 0.0, 1.0) for a in bend)
+    if thorough and not model.white:
+        gridded = [a for a in additions if a.effect.coefficient_grid()]
+        for harder in (
+            search.slowly,
+            search.other_variants,
+            lambda: search.anew(SMALL_STEPS),
+            lambda: search.from_motion(shortlist(by_motion, short) + shortlist(worth, short), SMALL_STEPS),
+            lambda: search.from_model(shortlist(by_motion, short) + shortlist(worth, long)),
+            lambda: search.from_motion(shortlist(worth, short) + shortlist(by_motion, long)),
+            search.profile,
+            lambda: search.from_motion([one for a in gridded for one in grid_starts(magnitudes, model, a)]),
+            search.slowly,
+            lambda: search.anew(LARGE_NOISE),
+        ):
+            if search.reached_the_floor():
+                break
+            harder()
+    return search.ranking()
+
+
+class _Search:
+    """The best fit of each effect and target so far."""
+
+    def __init__(self, magnitudes: Magnitudes, model: Model, screened: Sequence[Screened]):
+        self.magnitudes, self.model, self.screened = magnitudes, model, screened
+        self.least = model.fit.cost
+        self.done: set[tuple[int, Schedule]] = set()
+        self.found: dict[tuple[str, str], CandidateFit] = {}
+        for one in screened:
+            self.found.setdefault(one.addition.key, CandidateFit(one.addition, one.gain, None, one))
+
+    def from_motion(self, chosen: Iterable[Screened], schedule: Schedule = FROM_MEASURED_MOTION) -> None:
+        """Fit candidates from the measured motion."""
+        for one in chosen:
+            self._fit(one.addition, None, schedule)
+            if one.addition.effect.extensions(self.magnitudes.structure, one.addition):
+                self._extended(one.addition)
+
+    def from_model(self, chosen: Iterable[Screened]) -> None:
+        """Fit candidates from the fit of the model without them."""
+        for one in chosen:
+            self._fit(one.addition, one, FROM_SIMULATION)
+
+    def go_on_from(self, found: Iterable[CandidateFit]) -> None:
+        """Fit candidates from where their fits in another noise have ended."""
+        for one in found:
+            self._note(one.addition, fit(self._problem(one.addition), one.fit.point))
+
+    def other_variants(self) -> None:
+        """Fit the best ones in the other ways in which they may act on their targets."""
+        best = {one.addition.key for one in self._best()}
+        ways = [one for one in self.screened if len(one.addition.effect.variants) > 1]
+        self.from_motion(one for one in ways if one.addition.key in best)
+
+    def _extended(self, addition: Addition) -> None:
+        """With what an unmodelled body pushes: the rest of its balance may go to any body that it may touch."""
+        hosts: dict[str, Addition] = {addition.host: addition}
+        for one in self.screened:
+            if one.addition.key == addition.key:
+                hosts.setdefault(one.addition.host, one.addition)
+        for host in list(hosts.values())[: THRESHOLDS.most_hosts]:
+            for variant in host.effect.extensions(self.magnitudes.structure, host):
+                self._fit(variant)
+        best = self.found[addition.key].addition
+        if best.taken_from:
+            self._fit(replace(best, taken_from=None))
+
+    def profile(self) -> None:
+        """Fit the likeliest of the constants that say when a force ends, over them."""
+        profiled: dict[tuple[str, str], list[Addition]] = {}
+        for one in self.screened:
+            if one.addition.effect.profiled:
+                profiled.setdefault(one.addition.key, []).append(one.addition)
+        looks = [
+            profile(self._problem(starts[0]), starts[0], [addition.coefficient for addition in starts])
+            for starts in list(profiled.values())[: THRESHOLDS.most_profiles]
+        ]
+        best = min(looks, key=lambda look: look.fit.cost, default=None)
+        if best and best.fit.cost < self.model.fit.cost:
+            self._note(best.addition, closer(best))
+
+    def slowly(self) -> None:
+        """Fit the best ones on, with care for forces that jump."""
+        for one in self._best():
+            on = fit(one.fit.problem, one.fit.point, SLOW_CONTACT, most=2 * MOST_ITERATIONS)
+            self._note(one.addition, on)
+
+    def anew(self, schedule: Schedule) -> None:
+        """Fit the best ones from the measured motion by another schedule."""
+        for one in self._best():
+            self._fit(one.addition, None, schedule)
+
+    def _best(self) -> list[CandidateFit]:
+        return [one for one in self.ranking() if one.fit][: THRESHOLDS.with_care]
+
+    def _fit(
+        self, addition: Addition, screened: Screened | None = None, schedule: Schedule = FROM_MEASURED_MOTION
+    ) -> None:
+        if (id(addition), schedule) in self.done:
+            return
+        self.done.add((id(addition), schedule))
+        problem = self._problem(addition)
+        start = start_from(self.model, problem, addition, screened) if screened else None
+        hopeless = self.model.fit.cost if self.model.white else self.least + THRESHOLDS.hopeless
+        self._note(addition, fit(problem, start, schedule, hopeless))
+
+    def _note(self, addition: Addition, found: Fit) -> None:
+        self.least = min(self.least, found.cost)
+        against = addition.effect.log_prior_odds_against(self.magnitudes.structure)
+        gain = found.evidence - self.model.fit.evidence - against
+        before = self.found.get(addition.key)
+        if before is None or before.fit is None or _odds(addition, gain) > _odds(before.addition, before.gain):
+            self.found[addition.key] = CandidateFit(addition, gain, found)
+
+    def _problem(self, addition: Addition) -> OutputErrorProblem:
+        model = self.model
+        return make_problem(self.magnitudes, model.records, [*model.additions, addition], model.roughness)
+
+    def reached_the_floor(self) -> bool:
+        """The best so far leaves nothing but noise."""
+        best = next(iter(self.ranking()), None)
+        if best is None or best.fit is None or best.gain <= THRESHOLDS.gain:
+            return False
+        return analyse(best.fit, sharply=True).white
+
+    def ranking(self) -> list[CandidateFit]:
+        """Fitted ones first: a screened gain is an estimate, and does not rank above a fit."""
+        fitted = sorted((one for one in self.found.values() if one.fit), key=lambda one: -one.gain)
+        rest = sorted((one for one in self.found.values() if not one.fit), key=lambda one: -one.gain)
+        least = max(fitted[-1].gain, 0.0) if fitted else float("inf")
+        return fitted + [one._replace(gain=min(one.gain, least)) for one in rest]
+
+
+def start_from(model: Model, problem: OutputErrorProblem, addition: Addition, screened: Screened | None) -> Point:
+    """Where the model without the addition has ended, with the coefficient that its screening estimates."""
+    theta = problem.layout.start.copy()
+    theta[embedding(model.fit.layout, problem.layout)] = model.fit.theta
+    if screened and not addition.effect.changes_law:
+        theta[problem.layout.term(addition).coefficient] = screened.coefficient
+    return problem.moved(theta, model.fit.trajectories)
+
+
+def grid_starts(magnitudes: Magnitudes, model: Model, addition: Addition) -> list[Screened]:
+    """No error yet, and the coefficients with which the forces along the measured motion fit best."""
+    shifted = [replace(addition, coefficient=c) for c in addition.effect.coefficient_grid()]
+
+    def misfit(one: Addition) -> float:
+        return equation_error_left(make_problem(magnitudes, model.records, [*model.additions, one], model.roughness))
+
+    starts = [addition, *sorted(shifted, key=misfit)[: THRESHOLDS.offset_starts]]
+    return [Screened(one, 0.0, one.coefficient or 0.0, 1.0) for one in starts]
+
+
+def _odds(addition: Addition, gain: float) -> float:
+    """Among an effect's own variants: an unmodelled body that was counted in with another must gain more.
+
+    Without a measured force nothing tells it from one beside the model's masses: halving every force and mass leaves
+    the motion as it is.
+    """
+    return gain - (THRESHOLDS.counted_in if addition.taken_from else 0.0)
+
+
+def _bends_driven_motion(magnitudes: Magnitudes, addition: Addition) -> bool:
+    driven = [channel for body in magnitudes.structure.bodies if body.driven for channel in body.acceleration]
+    return bool(addition.effect.distorts) and addition.target in driven

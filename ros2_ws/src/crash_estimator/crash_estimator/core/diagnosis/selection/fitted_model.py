@@ -1,0 +1,88 @@
+"""A structure with some additions, fitted to recordings."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...effects.effect import Addition
+from ..observation.record import ObservedRecord
+from ..output_error.continuation import LARGE_NOISE, SLOW_CONTACT, SMALL_STEPS, Schedule
+from ..output_error.gauss_newton import MOST_ITERATIONS, Fit, fit
+from ..output_error.problem import OutputErrorProblem, Point, make_problem
+from ..parameterization.free_curve import adapted_roughness
+from ..parameterization.layout import Layout
+from ..parameterization.magnitudes import Magnitudes
+from ..residuals.residuals import Residuals, analyse
+from .acceptance import better, cost_of_nothing, settled
+
+
+class Model(NamedTuple):
+    """The structure with some additions, fitted."""
+
+    additions: tuple[Addition, ...]
+    fit: Fit
+    residuals: Residuals
+    roughness: Mapping[str, np.ndarray]
+
+    @property
+    def records(self) -> tuple[ObservedRecord, ...]:
+        """With the noise that it was fitted with."""
+        return self.fit.problem.records
+
+    @property
+    def white(self) -> bool:
+        """It leaves nothing but noise."""
+        return self.residuals.white
+
+    def refitted(self, start: Point | None = None, schedule: Schedule = (), hopeless: float = np.inf) -> "Model":
+        """The same model fitted another way."""
+        found = fit(self.fit.problem, start, schedule, hopeless)
+        return self._replace(fit=found, residuals=analyse(found, sharply=True))
+
+    def best_of(self, schedules: Sequence[Schedule]) -> "Model":
+        """The best of this fit and those from the measured motion by other schedules."""
+        best = self
+        for schedule in schedules:
+            other = self.refitted(schedule=schedule)
+            best = other if better(other, best) else best
+        return best
+
+
+def fit_model(
+    magnitudes: Magnitudes, records: Sequence[ObservedRecord], additions: Sequence[Addition], start: Point | None = None
+) -> Model:
+    """Fit, then let the curves fold where they were found to bend sharply, and fit again."""
+    problem = make_problem(magnitudes, records, additions)
+    found = fit(problem, start)
+    if not found.cost < cost_of_nothing(records):
+        found = fit(problem, schedule=SMALL_STEPS)
+    curves = [link for link in problem.layout.links if link.curve is not None]
+    roughness = {link.name: adapted_roughness(link.curve, found.theta) for link in curves}
+    if roughness and np.isfinite(found.cost):
+        problem = make_problem(magnitudes, records, additions, roughness)
+        found = fit(problem, found.point)
+    residuals = analyse(found, sharply=True)
+    if not problem.noise_is_inflated:
+        found, residuals = _with_more_care(problem, found, residuals)
+    return Model(tuple(additions), found, residuals, roughness)
+
+
+def _with_more_care(problem: OutputErrorProblem, found: Fit, residuals: Residuals) -> tuple[Fit, Residuals]:
+    """Where a jump of a force may have stopped the fit short, or the motion has not settled: fitted on, or anew."""
+    if forces_jump(problem.layout) and not residuals.white:
+        slower = fit(problem, found.point, SLOW_CONTACT, most=2 * MOST_ITERATIONS)
+        if slower.evidence > found.evidence:
+            found, residuals = slower, analyse(slower, sharply=True)
+    if not settled(found, residuals):
+        for other in [fit(problem, schedule=schedule) for schedule in (SMALL_STEPS, LARGE_NOISE)]:
+            there = analyse(other, sharply=True)
+            if there.mean_square < residuals.mean_square:
+                found, residuals = other, there
+    return found, residuals
+
+
+def forces_jump(layout: Layout) -> bool:
+    """Whether some force ends at separation other than by falling to zero."""
+    one_way = [link for link in layout.links if not link.tension]
+    return any(link.parallel or link.damping is not None or link.known_damping for link in one_way)

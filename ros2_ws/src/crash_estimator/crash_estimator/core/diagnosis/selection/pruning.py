@@ -1,0 +1,72 @@
+"""Additions that go again: superseded by later ones, or no part of an explanation."""
+
+from collections.abc import Sequence
+
+from ...effects.effect import Addition
+from ..output_error.continuation import SMALL_STEPS
+from ..output_error.gauss_newton import fit
+from ..output_error.problem import make_problem
+from ..parameterization.magnitudes import Magnitudes
+from ..residuals.residuals import analyse
+from .fitted_model import Model
+from .selection_step import SelectionStep, fit_stated
+from .thresholds import THRESHOLDS
+
+
+def without_the_superseded(
+    magnitudes: Magnitudes, path: list[SelectionStep], final: Model, present: int
+) -> tuple[list[SelectionStep], Model]:
+    """An effect added first may have stood for one that was found later: what the evidence can spare goes again."""
+    number = present
+    while final.white and number < len(final.additions) - 1:
+        fewer = final.additions[:number] + final.additions[number + 1 :]
+        smaller = _refitted(magnitudes, fewer, final)
+        if not smaller.white or smaller.fit.evidence < final.fit.evidence - THRESHOLDS.gain:
+            number += 1
+            continue
+        path = path[: number - present] + path[number - present + 1 :]
+        models = [_refitted(magnitudes, fewer[: present + k], final) for k in range(len(path) - 1)] + [smaller]
+        gains = [b.fit.evidence - a.fit.evidence for a, b in zip(models, models[1:], strict=False)] + [None]
+        path = [_again(*each) for each in zip(path, models, gains, strict=True)]
+        final = smaller
+    return path, final
+
+
+def _refitted(magnitudes: Magnitudes, additions: Sequence[Addition], like: Model) -> Model:
+    """Fitted with the other, larger model's hyperparameters, so that evidences compare; from where that one has ended,
+    and, as it may have been led astray, from the measured motion."""
+    problem = make_problem(magnitudes, like.records, additions, like.roughness)
+    from_there = problem.narrowed(like.fit.layout, like.fit.point)
+    fits = (fit(problem, from_there), fit(problem), fit(problem, schedule=SMALL_STEPS))
+    found = max(fits, key=lambda one: one.evidence)
+    return Model(tuple(additions), found, analyse(found, sharply=True), like.roughness)
+
+
+def _again(step: SelectionStep, before: Model, gain: float | None) -> SelectionStep:
+    best, *others = step.candidates
+    return step._replace(before=before, candidates=[best if gain is None else best._replace(gain=gain), *others])
+
+
+def up_to_the_least_error(
+    path: Sequence[SelectionStep], final: Model, present: int
+) -> tuple[list[SelectionStep], Model]:
+    """The steps, and the last model, up to the one that leaves the least, and while each addition is more than nothing.
+
+    What leaves white noise stands as it is. In a noise as large as the misfit a fit can end where the evidence is
+    better and the error is not: what comes after the least error is no part of an explanation.
+    """
+    models = [step.before for step in path]
+    if models[-1] is not final:
+        models.append(final)
+    if final.white:
+        return list(path), final
+    errors = [model.residuals.rms for model in models[: 1 + len(final.additions) - present]]
+    last = errors.index(min(errors))
+    last = next((k for k, step in enumerate(path[:last]) if _is_nothing(step, final)), last)
+    return (list(path[: last + 1]), models[last]) if last < len(errors) - 1 else (list(path), final)
+
+
+def _is_nothing(step: SelectionStep, final: Model) -> bool:
+    """An addition whose coefficient has ended at zero; beside a body's curve, its mass may."""
+    fitted, addition = fit_stated(step, final), step.candidates[0].addition
+    return not addition.touches and fitted.theta[fitted.layout.term(addition).coefficient] == 0.0

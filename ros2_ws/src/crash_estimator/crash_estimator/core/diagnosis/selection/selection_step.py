@@ -1,0 +1,105 @@
+"""One step of the selection: all candidates for one more addition, in the sensors' noise or in a larger one."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...effects.effect import Addition, Effect
+from ..observation.noise_inflation import with_inflated_noise
+from ..observation.record import ObservedRecord
+from ..output_error.continuation import FROM_SIMULATION, LARGE_NOISE, SMALL_STEPS
+from ..output_error.gauss_newton import Fit, fit
+from ..output_error.normal_equations import may_diverge
+from ..output_error.problem import Point
+from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
+from ..residuals.residuals import analyse
+from .acceptance import better
+from .candidate_fits import CandidateFit, fit_candidates
+from .fitted_model import Model, fit_model
+from .thresholds import THRESHOLDS
+
+
+class SelectionStep(NamedTuple):
+    """The model before it, and all candidates for one more addition, best first."""
+
+    before: Model
+    candidates: list[CandidateFit]
+    as_recorded: Sequence[CandidateFit] = ()  # in the sensors' noise, where `candidates` are in a larger one
+
+    @property
+    def best(self) -> CandidateFit | None:
+        first = self.candidates[0] if self.candidates else None
+        return first if first and first.fit and first.gain > THRESHOLDS.gain else None
+
+
+def selection_step(
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: Sequence[SelectionStep] = ()
+) -> SelectionStep:
+    """Candidates against the sensors' noise; where none leaves only that, against what the best of them leaves.
+
+    path: the steps before.
+    """
+    earlier = [one for step in path for one in step.candidates]
+    found = fit_candidates(magnitudes, effects, model, thorough=True, earlier=earlier)
+    done = SelectionStep(model, found, found)
+    if model.white or (done.best and analyse(done.best.fit).white):
+        return done
+    for _ in range(THRESHOLDS.inflations):
+        residuals = analyse(done.best.fit) if done.best else done.before.residuals
+        noisier = with_inflated_noise(model.records, bounded(residuals.residual, model.records))
+        before = fit_model(magnitudes, noisier, model.additions)
+        problem = before.fit.problem
+        for start in [done.before.fit, *(one.fit for one in done.candidates[:1] if one.fit)]:
+            further = before.refitted(problem.narrowed(start.layout, start.point), FROM_SIMULATION)
+            before = further if better(further, before) else before
+        if before.white:  # so it looks; the sensors' own noise decides
+            decided = analyse(fit(model.fit.problem, before.fit.point), sharply=True).band_test
+            before = before._replace(residuals=before.residuals._replace(band_test=decided))
+        done = SelectionStep(before, fit_candidates(magnitudes, effects, before, in_other_noise=found), found)
+    return done
+
+
+@may_diverge
+def bounded(residuals: Sequence[np.ndarray], records: Sequence[ObservedRecord]) -> list[np.ndarray]:
+    """Residuals, and what was measured itself where a motion without bounds has left more."""
+    pairs = zip(residuals, (record.measured for record in records), strict=True)
+    return [r if np.nanstd(r) < np.nanstd(measured) else measured for r, measured in pairs]
+
+
+def added(
+    magnitudes: Magnitudes, records: Sequence[ObservedRecord], model: Model, best: CandidateFit
+) -> tuple[Magnitudes, Model]:
+    """The model with a candidate that was fitted, on records, and the magnitudes that it then has."""
+    additions = [*model.additions, as_found(best)]
+
+    def fitted(magnitudes: Magnitudes, start: Point | None) -> tuple[Magnitudes, Model]:
+        larger = fit_model(magnitudes, records, additions, start)
+        return magnitudes, larger if larger.white else larger.best_of((SMALL_STEPS, LARGE_NOISE))
+
+    if not best.addition.effect.distorts:
+        return fitted(magnitudes, best.fit.point)
+    # the measured motion was wrong, and with it the crushes that the curves reach over
+    mended = measure_magnitudes(magnitudes.structure, records, magnitudes.cells, best.fit.trajectories)
+    anew = fitted(mended, None)
+    if anew[1].white:
+        return anew
+    return min(anew, fitted(magnitudes, best.fit.point), key=lambda one: one[1].residuals.mean_square)
+
+
+def as_found(found: CandidateFit) -> Addition:
+    """The addition, starting where its fit has ended."""
+    theta = found.fit.theta
+    term = found.fit.layout.term(found.addition)
+    shapes = {name: float(np.exp(theta[p])) for name, p in term.shapes.items()}
+    return replace(found.addition, coefficient=float(theta[term.coefficient]), shapes=shapes)
+
+
+def fit_stated(step: SelectionStep, final: Model) -> Fit:
+    """The fit that a step's coefficient is stated from; final: the model with all that was added.
+
+    The last model knows best; but where the noise had to be taken larger, it is the step's own fit that is honest.
+    """
+    inflated = final.fit.problem.noise_is_inflated and step.before.fit.problem.noise_is_inflated
+    return step.candidates[0].fit if inflated else final.fit

@@ -1,0 +1,62 @@
+"""Every tuned number of the model selection, with its unit, its reason, and what it was tuned on.
+
+"Development cases" are simulated ones on seeds that no judging run uses (docs/missing-effects.md).
+"""
+
+from typing import NamedTuple
+
+
+class Thresholds(NamedTuple):
+    """Settings of the search."""
+
+    # What counts, in nats of evidence
+    gain: float = 6.0
+    """From which a candidate counts as found: odds of 400 to 1 for some hundred candidates (Kass and Raftery 1995 call
+    5 very strong)."""
+    gain_beyond_white: float = 20.0
+    """For one more effect where those found leave white noise already: nothing but its evidence speaks for it."""
+    gain_in_pair: float = 100.0
+    """Of each of two that are found at once: there are thousands of pairs, and some mimic anything small."""
+    confounded: float = 10.0
+    """Evidences closer than this do not tell two candidates apart. More than `gain`: Laplace's approximation and the
+    priors of two different laws leave some nats open between them."""
+    counted_in: float = 6.0
+    """That an unmodelled body whose mass the model's own contain must gain over one beside them."""
+    worth_fitting: float = 1.0
+    """Of a screened gain."""
+
+    # What is left, in units of the sensors' noise
+    near_floor: float = 2.0
+    """Mean square below which a driven channel's error, or a finer curve, may be all that is missing."""
+    real_structure: float = 100.0
+    """Mean square from which on no second effect is looked for at once: of a real structure none takes that."""
+    least_share: float = 0.15
+    """Of what the model before it leaves above the floor: an addition that removes less of it, and still leaves more
+    than noise, is no explanation."""
+    all_but_folds: float = 0.95
+    """Share that two of a kind must remove, where they do not leave noise alone: the rest may be folds of the curves."""
+
+    # How much is tried
+    most_steps: int = 4
+    shortlist: int = 4
+    """Candidates from each of the two screenings that are fitted in full ..."""
+    long_list: int = 10
+    """... and where none of them leaves white noise."""
+    most_hosts: int = 3
+    """Bodies that an unmodelled one is tried on, with a curve to each neighbour."""
+    with_care: int = 3
+    """Candidates that are then fitted on by other schedules."""
+    most_profiles: int = 4
+    """Slopes on which an element may unload that are looked at over their value."""
+    offset_starts: int = 2
+    """Values of an offset that fits are started from: those with which the forces along the measured motion fit best."""
+    first_of_pair: int = 3
+    """Candidates that are tried with a second one at once."""
+    inflations: int = 3
+    """Times that the noise is taken as large as what the best candidate leaves."""
+    hopeless: float = 400.0
+    """Cost: a candidate that stays this far above the best one's is not fitted to the end; where the model leaves only
+    noise, nor is one that does not come below the model's own."""
+
+
+THRESHOLDS = Thresholds()

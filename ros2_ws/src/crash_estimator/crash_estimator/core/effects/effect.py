@@ -1,0 +1,188 @@
+"""What a physical effect is, and what each kind of effect says of itself; the kinds are in `kinds`, a file each.
+
+An effect has a name, a coefficient with its unit and limits, and shape constants. Its kind says what it acts on, what
+it adds to the equations of motion, how an estimator and a free run take it, and how a diagnosis searches for it.
+Nothing outside a kind's own file asks which kind an effect is of: what differs is a method or a constant below.
+
+An element's force is
+
+    F = static (1 + c h(V)) + C V + sum of c_i f_i        where the element carries, 0 where it is apart
+
+with the static force from its curve, `h` of a `StaticFactor` and `f` of an `ElementForce`. All functions take
+whole records (arrays) and read the history, which is made once, causally, elsewhere.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from crash_replay.recording import Test
+
+from ..structure import EffectSpec, ModelError, Structure
+
+if TYPE_CHECKING:  # of the diagnosis, which is built upon the effects
+    from ..diagnosis.mechanics.spring import Law
+    from ..diagnosis.parameterization.magnitudes import Magnitudes
+
+
+class ElementMotion(NamedTuple):
+    """One element's motion over g instants."""
+
+    time: np.ndarray  # (g,) s since the impact
+    crush: np.ndarray  # (g,) m, compression positive
+    rate: np.ndarray  # (g,) m/s
+    peak: np.ndarray  # (g,) m, largest crush so far, never below 0
+    static: np.ndarray  # (g,) N, the force of the element's own curve
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A shape constant, found in the fit between two limits; it is searched from each of the starts."""
+
+    unit: str
+    low: float
+    high: float
+    starts: tuple[float, ...]
+    of_crush: bool = False  # limits and starts are shares of the element's largest crush
+
+
+class OwnLink(NamedTuple):
+    """A spring of an effect's own: F = c X between two bodies."""
+
+    ends: tuple[int, int]
+    tension: bool
+    origin: tuple[float, ...]  # m, crush at time zero in each recording where it counts from there; else empty
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Common to all; `low` and `high` bound the coefficient physically."""
+
+    name: str
+    unit: str  # of the coefficient
+    shapes: Mapping[str, Shape] = field(default_factory=dict)
+    low: float = 0.0
+    high: float = np.inf
+    size: float | None = None  # order of magnitude of the coefficient; None: what carries half of the target's force
+
+    # What it acts on
+    acts_on: ClassVar[str] = "element"  # the key of a model file: element, body, channel or between
+    function: ClassVar[str] = ""  # the field that holds its physics, where a user may write an effect of the kind
+
+    # Its place in an element's force
+    in_parallel: ClassVar[bool] = False  # c f(motion) beside the spring
+    scales_static: ClassVar[bool] = False  # 1 + c h(V) times the spring
+    changes_law: ClassVar[bool] = False  # a constant of the spring's law itself, in which the force is not linear
+    compression_only: ClassVar[bool] = False  # an element that has it carries no tension
+
+    # Its place in the rest of the model
+    attaches_body: ClassVar[bool] = False  # a further body, driven by the channel that is the target
+    distorts: ClassVar[str] = ""  # what it makes wrong of a channel: delay, gain or offset
+    balances_momentum: ClassVar[bool] = False  # it changes what masses and forces must add up to
+    replaces: ClassVar[str] = ""  # the element's key in a model file that it takes the place of
+
+    # How a diagnosis searches for it
+    variants: ClassVar[tuple[str, ...]] = ("",)  # ways in which it may act on one target
+    profiled: ClassVar[bool] = False  # its coefficient says when a force jumps to zero: the cost has a V over it
+    restated: ClassVar[bool] = False  # the literature states the coefficient otherwise than it is fitted
+
+    def possible_targets(self, structure: Structure, test: Test | None) -> list[str] | None:
+        """All that it can act on; None: any channel that the model does not use, of a test that is not known."""
+        return [element.name for element in structure.elements]
+
+    def stated_limits(self) -> tuple[float, float]:
+        """Of the coefficient as a model file states it."""
+        return self.low, self.high
+
+    def trial_argument(self, motion: ElementMotion) -> Any:
+        """What its function is given, of a motion that a user's effect is tried on."""
+        return motion
+
+    def put_to_work(self, structure: Structure, test: Test, spec: EffectSpec) -> Structure:
+        """The structure as estimators and free runs take it: with this effect in its elements, masses or actions.
+
+        Raises ModelError where a constant is not given that no estimator can follow.
+        """
+        raise ModelError(f"effect {self.name} is of a kind that estimators cannot take: {type(self).__name__}")
+
+    # --- the motion of a diagnosis: `law` and its like are of `core.diagnosis.mechanics`
+
+    def changed_law(self, law: "Law", c: float) -> "Law":
+        """The spring's law with the coefficient c in it."""
+        return law
+
+    def law_derivative(self, on_line: np.ndarray, lag: np.ndarray, kx: np.ndarray, kp: np.ndarray) -> np.ndarray | None:
+        """(g,) of the spring's force by the coefficient in its law; None where it has none there.
+
+        on_line (g,): on the unloading line; lag (g,) m: crush less its peak, times what scales the
+        spring's force, 0 where apart; kx, kp (g,) N/m: slopes by crush and peak.
+        """
+        return None
+
+    def own_link(self, addition: "Addition", index: Mapping[str, int], starts: Sequence[np.ndarray]) -> OwnLink | None:
+        """A spring of its own; starts: displacement (b,) m of the bodies at time zero of each recording."""
+        return None
+
+    def mass_shares(self, addition: "Addition") -> Mapping[str, float]:
+        """kg that bodies are heavier by for one unit of the coefficient."""
+        return {}
+
+    def body_load(
+        self, addition: "Addition", time: np.ndarray, inertial: Callable[[str], np.ndarray]
+    ) -> tuple[str, np.ndarray] | None:
+        """A body, and the force (g,) N on it for one unit; inertial(channel): acceleration (g,) of an attached body."""
+        return None
+
+    # --- the search of a diagnosis
+
+    def candidates(self, structure: Structure, magnitudes: "Magnitudes") -> Iterator["Addition"]:
+        """All admissible additions, several on one target where the search has several starts."""
+        yield from ()
+
+    def prior_std(self, magnitudes: "Magnitudes", addition: "Addition") -> float:
+        """Prior standard deviation of the coefficient, where `size` does not state it."""
+        raise TypeError(f"effect {self.name} is of a kind without an order of magnitude: {type(self).__name__}")
+
+    def lowest(self, magnitudes: "Magnitudes", addition: "Addition") -> float:
+        """Least coefficient that a fit admits."""
+        return self.low
+
+    def coefficient_grid(self) -> Sequence[float]:
+        """Coefficients that a fit is to be started from as well; of most kinds none."""
+        return ()
+
+    def extensions(self, structure: Structure, addition: "Addition") -> list["Addition"]:
+        """The addition with further free parameters, which are tried once it is a candidate."""
+        return []
+
+    def log_prior_odds_against(self, structure: Structure) -> float:
+        """Nats that it must gain over other candidates, where no measurement can tell them apart."""
+        return 0.0
+
+    def stated(self, c: float, **shapes: float) -> float:
+        """The coefficient as the literature states it."""
+        return c
+
+    def unstated(self, value: float, **shapes: float) -> float:
+        """The coefficient as it is fitted."""
+        return value
+
+
+@dataclass(frozen=True)
+class Addition:
+    """An effect on a target: what is added to a structure."""
+
+    effect: Effect
+    target: str
+    shapes: Mapping[str, float] = field(default_factory=dict)  # where the search starts, absolute
+    coefficient: float | None = None  # likewise
+    host: str | None = None  # unmodelled_body: the body that feels its inertia
+    touches: str | None = None  # unmodelled_body: the body that it pushes by a free curve
+    taken_from: str | None = None  # unmodelled_body: the free body whose mass it was counted in
+    variant: str = ""  # one of the effect's `variants`
+
+    @property
+    def key(self) -> tuple[str, str]:
+        return self.effect.name, self.target

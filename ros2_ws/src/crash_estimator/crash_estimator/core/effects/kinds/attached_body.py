@@ -1,0 +1,94 @@
+"""A body that the model has not got, moving as an unused acceleration channel shows."""
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import ClassVar
+
+import numpy as np
+
+from ...kinematics import initial_motion
+from ...structure import Body, Coefficient, Element, Structure
+from ..effect import Addition, Effect
+from ..estimator_model import ROUGHLY, coefficient_of, heavier, with_action
+
+
+@dataclass(frozen=True)
+class AttachedBody(Effect):
+    """A body that the model has not got, moving as an unused acceleration channel shows; the coefficient: its mass."""
+
+    acts_on: ClassVar[str] = "channel"
+    attaches_body: ClassVar[bool] = True
+    balances_momentum: ClassVar[bool] = True
+
+    def possible_targets(self, structure, test):
+        if test is None:
+            return None
+        used = [name for body in structure.bodies for name in (*body.acceleration, body.force) if name]
+        return [c.name for c in test.channels if c.quantity == "acceleration" and c.name not in used]
+
+    def put_to_work(self, structure, test, spec):
+        """A driven body that its host carries: the host feels - m a of it, and whatever else pushes it."""
+        free = next(body.name for body in structure.bodies if body.free)
+        host = spec.host or free
+        starts_with = structure.body_index[spec.taken_from or (free if _body(structure, host).fixed else host)]
+        start = tuple(float(values[starts_with]) for values in initial_motion(structure, test))
+        body = Body(spec.target, acceleration=(spec.target,), driven=True, carried_by=host, start=start)
+        elements = structure.elements
+        if spec.touches:
+            free_curve = Coefficient(0.0, estimated=True, min=0.0)
+            name = f"{spec.touches}-{spec.target}"
+            elements += (Element(name, (spec.touches, spec.target), free_curve, replace(free_curve, shape="constant")),)
+        lighter = structure.body_index[spec.taken_from] if spec.taken_from else -1
+        if spec.coefficient is not None and spec.taken_from:
+            structure = heavier(structure, lighter, -spec.coefficient)
+        scale = ROUGHLY * max(body.mass or 0.0 for body in structure.bodies)
+        structure = replace(structure, bodies=(*structure.bodies, body), elements=elements)
+        return with_action(
+            structure, spec, self.unit, "inertia", structure.body_index[host], coefficient_of(spec, self), scale,
+            body=len(structure.bodies) - 1, lighter=lighter,
+        )  # fmt: skip
+
+    def mass_shares(self, addition):
+        return {addition.taken_from: -1.0} if addition.taken_from else {}
+
+    def body_load(self, addition, time, inertial):
+        return addition.host, -inertial(addition.target)
+
+    def candidates(self, structure, magnitudes):
+        """On every unused channel of the model's axis: what feels the body's inertia, and if its mass was counted in."""
+        for channel in _unused(structure, magnitudes):
+            for host in structure.bodies:
+                if host.free or (host.fixed and host.force):
+                    yield Addition(self, channel, host=host.name)
+                    owners = _neighbours(structure, host) if host.fixed else [host.name]
+                    for owner in owners:
+                        if _body(structure, owner).free:
+                            yield Addition(self, channel, host=host.name, taken_from=owner)
+
+    def prior_std(self, magnitudes, addition):
+        return ROUGHLY * sum(body.mass for body in magnitudes.structure.bodies if body.free)
+
+    def extensions(self, structure, addition):
+        """The same body between its host and each one that an element joins to the host, pushed by a free curve."""
+        return [replace(addition, touches=name) for name in _neighbours(structure, _body(structure, addition.host))]
+
+
+def _unused(structure: Structure, magnitudes) -> list[str]:
+    """Acceleration channels of the model's axis that it does not use; of two that agree to the last bit one."""
+    used = {name for _, name, _ in structure.channels()}
+    channels, signals = magnitudes.records[0].test.channels, magnitudes.records[0].signals
+    axes = {channel.axis for channel in channels if channel.name in used}
+    unused = [c.name for c in channels if c.quantity == "acceleration" and c.axis in axes and c.name not in used]
+    copies = {b for a, b in combinations(unused, 2) if np.array_equal(signals[a].values, signals[b].values)}
+    return [name for name in unused if name not in copies]
+
+
+def _body(structure: Structure, name: str) -> Body:
+    return structure.bodies[structure.body_index[name]]
+
+
+def _neighbours(structure: Structure, body: Body) -> list[str]:
+    """The bodies that an element joins to a body."""
+    ends = [set(element.between) - {body.name} for element in structure.elements if body.name in element.between]
+    joined = {name for end in ends for name in end}
+    return [other.name for other in structure.bodies if other.name in joined]

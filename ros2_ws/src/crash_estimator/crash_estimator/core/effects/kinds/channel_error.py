@@ -1,0 +1,55 @@
+"""How a channel differs from the true signal."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ..effect import Addition, Effect
+from ..estimator_model import ROUGHLY, coefficient_of, to_be_given, with_action
+
+OFFSETS = 10
+"""An offset bends the measured motion itself, from which fits start: so many are looked at, evenly over its limits."""
+
+
+@dataclass(frozen=True)
+class ChannelError(Effect):
+    """How a channel differs from the true signal: recorded(t) = (1 + gain) true(t - delay) + offset."""
+
+    distorts: str = ""  # delay, gain or offset
+
+    acts_on: ClassVar[str] = "channel"
+    balances_momentum: ClassVar[bool] = True
+
+    def possible_targets(self, structure, test):
+        return [name for body in structure.bodies for name in (*body.acceleration, body.force) if name]
+
+    def put_to_work(self, structure, test, spec):
+        if spec.coefficient is not None:
+            return structure  # taken out of the samples: `core.effects.channels`
+        if self.distorts == "delay":
+            raise to_be_given(structure, spec, "its coefficient, in s")
+        k, body = next((k, b) for k, b in enumerate(structure.bodies) if spec.target in (*b.acceleration, b.force))
+        scale = self.size or ROUGHLY * (self.high if np.isfinite(self.high) else 1.0)
+        unit = self.unit
+        if body.fixed and self.distorts == "offset":
+            scale, unit = scale * sum(b.mass or 0.0 for b in structure.bodies if b.free), "N"
+        share = 1.0 / max(len(body.acceleration), 1)
+        return with_action(structure, spec, unit, self.distorts, k, coefficient_of(spec, self), scale, share=share)
+
+    def candidates(self, structure, magnitudes):
+        """On channels whose errors show: of free bodies and driven ones, and measured forces but for their zero."""
+        shown = []
+        for body in (structure.bodies[k] for k in structure.equations):
+            if body.free:
+                shown += body.acceleration
+            elif self.distorts != "offset":
+                shown.append(body.force)
+        shown += [name for body in structure.bodies if body.driven for name in body.acceleration]
+        yield from (Addition(self, name) for name in shown)
+
+    def coefficient_grid(self):
+        if self.distorts != "offset":
+            return ()
+        step = (self.high - self.low) / OFFSETS
+        return tuple(self.low + step * (k + 0.5) for k in range(OFFSETS))

@@ -1,0 +1,60 @@
+"""A force in parallel to an element's own, a function of its motion."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+from typing import ClassVar
+
+import numpy as np
+
+from ..effect import Addition, Effect
+from ..estimator_model import ROUGHLY, coefficient_of, element_index, typical_motion, with_action
+
+HALF = 0.5
+"""A coefficient's prior standard deviation carries this share of its target's largest force: as large as an effect
+that a model can lack and still be one of that crash; the evidence changes by ln 2 for a factor of two."""
+
+
+@dataclass(frozen=True)
+class ElementForce(Effect):
+    """A force in parallel to an element's own: c f, compression positive.
+
+    force(motion: ElementMotion, **shape constants) -> (g,) N per unit of the coefficient
+    """
+
+    force: Callable[..., np.ndarray] | None = None
+    of_crush_only: bool = False  # a function of the crush alone: a free curve of an elastic element contains it
+    doubles: str = ""  # the element's own coefficient that says the same: none is offered where that is estimated
+
+    function: ClassVar[str] = "force"
+    in_parallel: ClassVar[bool] = True
+
+    def put_to_work(self, structure, test, spec):
+        k, force = element_index(structure, spec.target), partial(self.force, **spec.shape)
+        typical = typical_motion(structure, k)
+        moved = np.abs(force(typical))
+        scale = ROUGHLY * float(typical.static[0]) / float(moved[moved > 0.0][0] if moved.any() else 1.0)
+        return with_action(structure, spec, self.unit, "element", k, coefficient_of(spec, self), scale, force=force)
+
+    def candidates(self, structure, magnitudes):
+        for element in magnitudes.crushed_elements():
+            free_curve = element.stiffness.estimated and element.stiffness.shape == "curve"
+            contained = self.of_crush_only and free_curve and not element.unloading
+            if not (contained or (self.doubles and getattr(element, self.doubles).estimated)):
+                yield from on_element(self, magnitudes, element.name)
+
+    def prior_std(self, magnitudes, addition):
+        element = magnitudes.element(addition.target)
+        motions = [magnitudes.motion(r, element) for r in range(len(magnitudes.records))]
+        reach = [np.abs(self.force(motion, **addition.shapes)) for motion in motions]
+        largest = max(values[np.isfinite(values)].max(initial=0.0) for values in reach)
+        return HALF * magnitudes.force[element] / max(largest, 1e-12)
+
+
+def on_element(effect: Effect, magnitudes, element: str):
+    """One addition for each combination of the starts of its shape constants."""
+    largest, names = magnitudes.largest_crush(element), list(effect.shapes)
+    for values in product(*(effect.shapes[name].starts for name in names)):
+        unit = [largest if effect.shapes[name].of_crush else 1.0 for name in names]
+        yield Addition(effect, element, {n: v * u for n, v, u in zip(names, values, unit, strict=True)})
