@@ -3,13 +3,20 @@
 import copy
 from dataclasses import replace
 
+import numpy as np
 import pytest
+import yaml
 
-from crash_estimator.core.diagnosis.diagnosis import diagnose
-from crash_estimator.core.diagnosis.model import fit_model
-from crash_estimator.core.diagnosis.records import make_record
-from crash_estimator.core.diagnosis.scales import make_scales
-from crash_estimator.model_file import ModelFile
+from crash_estimator.cli.diagnose import apply
+from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
+from crash_estimator.core.diagnosis.report.diagnosis import diagnose
+from crash_estimator.core.diagnosis.selection.assumptions import never_pulling
+from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
+from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.fold import run
+from crash_estimator.core.methods import make_estimator
+from crash_estimator.model_file import ModelFile, load_model
 from crash_replay.synthetic.hidden.cases import draw_case
 from crash_replay.synthetic.hidden.laws import Carrier
 
@@ -61,8 +68,42 @@ def test_what_is_missing_is_found_alone_either_way(law):
 
 def test_the_two_ways_differ_by_far_more_than_noise():
     structure, recordings, _ = case(NeverPulls)
-    records = [make_record(structure, recording) for recording in recordings]
+    records = [observe(structure, recording) for recording in recordings]
     pulling, pushing = (
-        fit_model(structure, records, make_scales(structure, records, 36, pulls=pulls), ()) for pulls in (True, False)
+        fit_model(measure_magnitudes(assumed, records, 36), records, ())
+        for assumed in (structure, never_pulling(structure))
     )
-    assert pushing.left.whiteness.white and pushing.fit.evidence > pulling.fit.evidence + 100.0
+    assert pushing.residuals.band_test.white and pushing.fit.evidence > pulling.fit.evidence + 100.0
+
+
+def test_what_was_found_can_be_written_and_read_and_is_then_right_as_given(tmp_path):
+    """`--apply` writes `damper_pulls: false`; with it the model is adequate as it stands, and says no more of it."""
+    structure, recordings, _ = case(NeverPulls)
+    found = diagnose(structure, recordings)
+    assert not found.structure.elements[0].damper_pulls
+    drawn = draw_case("single", (), 60304)
+    model, applied = tmp_path / "given.yaml", tmp_path / "applied.yaml"
+    text = yaml.safe_load(drawn.model_text)
+    text["elements"]["car_barrier"]["damping"] = DAMPING
+    model.write_text(yaml.safe_dump(text))
+    apply(found, structure.effects, EFFECTS, str(model), str(applied))
+    written = load_model(applied, EFFECTS)
+    assert not written.elements[0].damper_pulls
+    again = diagnose(written, recordings)
+    assert again.verdict == "adequate" and "never pull" not in again.text
+
+
+def test_an_estimator_lets_go_where_the_damper_would_pull():
+    structure, recordings, _ = case(NeverPulls)
+    for model, pulls in ((structure, True), (never_pulling(structure), False)):
+        estimator = make_estimator(model, recordings[1].test, "constrained_kalman")
+        force = np.array([estimate.force[0] for estimate in run(estimator, recordings[1].samples())])
+        assert (force.min() < -0.01 * force.max()) == pulls
+
+
+def test_a_damper_that_never_pulls_is_of_an_element_that_carries_compression_only():
+    drawn = draw_case("single", (), 60304)
+    text = yaml.safe_load(drawn.model_text)
+    text["elements"]["car_barrier"] |= {"tension": "both", "damper_pulls": False}
+    with pytest.raises(ValueError, match="goes with `tension: none`"):
+        ModelFile.model_validate(text)

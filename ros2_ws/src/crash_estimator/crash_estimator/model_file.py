@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 from crash_replay.limits import MASS, NUMBER, Range
 from crash_replay.yaml_schema import Text, number, read_yaml
 
-from .core.effects.base import Effect
+from .core.effects.effect import Effect
 from .core.effects.targets import check_effects
 from .core.structure import Body, Coefficient, EffectSpec, Element, ModelError, Structure, Term
 
@@ -112,6 +112,7 @@ class ElementPart(Part):
     stiffness: CoefficientPart
     damping: CoefficientPart = CoefficientPart(value=0.0)
     tension: Literal["none", "both"] = "both"
+    damper_pulls: StrictBool = True  # with `tension: none`: until the spring is spent
     unloading: Positive | CoefficientPart | None = None  # N/m; or {estimate: true, initial: ...}
     crush_terms: dict[int, CoefficientPart] = {}  # power of the crush, 2 or more -> N/m^power
     rate_terms: dict[int, CoefficientPart] = {}  # power of the rate, 2 or more -> N (s/m)^power
@@ -129,6 +130,8 @@ class ElementPart(Part):
                 raise ValueError(
                     f"crush_terms and rate_terms have powers from 2 to 9 (the first is stiffness, damping), got {power}"
                 )
+        if not self.damper_pulls and self.tension == "both":
+            raise ValueError("`damper_pulls: false` goes with `tension: none`")
         if self.velocity and not self.displacement:
             raise ValueError("`velocity` goes with `displacement`")
         return self
@@ -140,6 +143,7 @@ class ElementPart(Part):
             stiffness=self.stiffness.coefficient(),
             damping=self.damping.coefficient(),
             tension=self.tension != "none",
+            damper_pulls=self.damper_pulls,
             unloading=self.unloading if isinstance(self.unloading, float) else None,
             displacement=self.displacement,
             velocity=self.velocity,

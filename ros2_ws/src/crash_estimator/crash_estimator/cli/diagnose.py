@@ -14,9 +14,8 @@ from crash_replay.foreign_text import visible
 from crash_replay.output import write_text
 from crash_replay.said import Parser, say
 
-from ..core.diagnosis.diagnosis import Diagnosis, diagnose
-from ..core.effects.base import Effect, UnloadingSlope
-from ..core.effects.targets import key_of
+from ..core.diagnosis import Diagnosis, diagnose
+from ..core.effects.effect import Effect
 from ..core.structure import EffectSpec
 from ..diagnosis_doubt import doubt
 from ..diagnosis_tables import diagnosis_tables
@@ -56,13 +55,17 @@ def apply(found: Diagnosis, had: tuple[EffectSpec, ...], effects: dict[str, Effe
     """Write the model's file, comments and all, with the added effects at its end -> what was added."""
     yaml = YAML()
     content = yaml.load(model_path(model).read_text(encoding="utf-8"))
+    for element in found.structure.elements:
+        if not element.damper_pulls:
+            content["elements"][element.name]["damper_pulls"] = False
     added = found.structure.effects[len(had) :]
     if added:
         content.setdefault("effects", [])
     for spec, step in zip(added, found.steps):
         entry = _entry(spec, effects[spec.type], list(content["bodies"]))
         if "coefficient" in entry:
-            instead = ", takes the place of the element's unloading" * isinstance(effects[spec.type], UnloadingSlope)
+            replaces = effects[spec.type].replaces
+            instead = f", takes the place of the element's {replaces}" if replaces else ""
             entry.yaml_add_eol_comment(f"+- {step.std:.2g} {step.unit}{instead}", "coefficient")
         content["effects"].append(entry)
     text = StringIO()
@@ -72,7 +75,7 @@ def apply(found: Diagnosis, had: tuple[EffectSpec, ...], effects: dict[str, Effe
 
 
 def _entry(spec: EffectSpec, effect: Effect, bodies: list[str]) -> CommentedMap:
-    key = key_of(effect)
+    key = effect.acts_on
     entry = CommentedMap({"type": spec.type, key: spec.target})
     if key == "between":
         pair = next(p for p in permutations(bodies, 2) if "-".join(map(visible, p)) == spec.target)

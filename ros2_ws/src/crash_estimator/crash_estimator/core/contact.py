@@ -7,8 +7,8 @@ down along the line from its peak,
 
 and climbs the same line again when it is reloaded. The known term Ku (X_peak - X) moves to the left side; K
 stays the secant stiffness of the peak, which every sample on the line still tells something about. An element
-without tension carries nothing where X <= 0, or where that line has come down to F = 0. Before the impact no
-element carries anything.
+without tension carries nothing where X <= 0, or where that line has come down to F = 0; one whose damper never pulls,
+where K X + C V < 0 either, with the latest K and C. Before the impact no element carries anything.
 """
 
 from typing import NamedTuple
@@ -45,6 +45,7 @@ class Contact:
     def __init__(self, structure: Structure):
         self.names = [element.name for element in structure.elements]
         self.compression_only = np.array([not element.tension for element in structure.elements], dtype=bool)
+        self.never_pulls = np.array([not element.damper_pulls for element in structure.elements], dtype=bool)
         slopes = [element.unloading_slope for element in structure.elements]  # of the estimated ones, at first
         self.unloading = np.array([e.unloading or (s.value if s else 0.0) for e, s in zip(structure.elements, slopes)])
         self.plastic = self.unloading > 0.0
@@ -54,9 +55,15 @@ class Contact:
         return ContactState(np.zeros(n), np.zeros(n), np.full(n, ElementState.APART, dtype=np.uint8))
 
     def step(
-        self, before: ContactState, motion: Motion, stiffness: np.ndarray, unloading: np.ndarray | None = None
+        self,
+        before: ContactState,
+        motion: Motion,
+        stiffness: np.ndarray,
+        unloading: np.ndarray | None = None,
+        damping: np.ndarray | float = 0.0,
     ) -> tuple[ContactState, SpringLaw, tuple[Event, ...]]:
-        """stiffness (e,): the latest known or estimated secant stiffness, N/m; unloading (e,) where it is estimated."""
+        """stiffness (e,): the latest known or estimated secant stiffness, N/m; unloading (e,) where it is estimated;
+        damping (e,): the latest, N s/m, which counts where a damper never pulls."""
         if motion.time < 0.0:
             nothing, none = np.zeros(len(self.names)), np.zeros(len(self.names), dtype=bool)
             return before, SpringLaw(nothing, nothing, none, none, before.peak_crush), ()
@@ -66,7 +73,8 @@ class Contact:
         slope = self.unloading if unloading is None else unloading
         shift = np.where(on_line, slope * (crush - peak), 0.0)
         spent = on_line & (stiffness * lever + shift <= 0.0)
-        apart = self.compression_only & ((crush <= 0.0) | spent)
+        pulled_off = self.never_pulls & (stiffness * lever + shift + damping * motion.rate < 0.0)
+        apart = self.compression_only & ((crush <= 0.0) | spent | pulled_off)
         peak_rate = np.maximum(before.peak_rate, np.abs(motion.rate))
         still = np.abs(motion.rate) <= REVERSAL * peak_rate
         turned = np.where(still, before.state == ElementState.UNLOADING, motion.rate < 0.0)

@@ -79,7 +79,8 @@ class Estimator:
         motion = self.regressor.corrected(motion, state.update.theta, self.start)
         stiffness = self.regressor.secant(state.update.theta, state.contact.peak_crush)
         unloading = self.regressor.unloading(state.update.theta)
-        contact, law, events = self.contact.step(state.contact, motion, stiffness, unloading)
+        damping = state.update.theta[self.regressor.damping_index]
+        contact, law, events = self.contact.step(state.contact, motion, stiffness, unloading, damping)
         regression, forces = self.regressor.make(motion, law, state.update.theta)
         method, update = state.method, state.update
         if motion.dt > 0.0 and self._excited(regression):

@@ -13,7 +13,7 @@ import numpy as np
 
 from .actions import beside_the_springs, coefficients
 from .characteristic import Characteristic, characteristics
-from .effects.base import ElementMotion
+from .effects.effect import ElementMotion
 from .estimate import Description, Estimate
 from .rating import Rating, rate
 from .structure import ModelError, Structure
@@ -107,6 +107,7 @@ class _System:
                 self.masses[action.lighter] -= value
         self.carried = [(k, structure.body_index[b.carried_by]) for k, b in enumerate(structure.bodies) if b.carried_by]
         self.origin = np.array([e.origin for e in structure.elements])
+        self.never_pulls = np.array([not (e.tension or e.damper_pulls) for e in structure.elements], dtype=bool)
         self.acts = {a.at for a in structure.actions if a.kind in ("element", "factor")}
         self.acts |= {k for k, e in enumerate(structure.elements) if e.factor}
         self.driven = [k for k, body in enumerate(structure.bodies) if body.driven]
@@ -130,10 +131,11 @@ class _System:
     def forces(self, t: float, x: np.ndarray, v: np.ndarray, peak: np.ndarray) -> np.ndarray:
         crush, rate = self.motion(t, x, v)
         peak = np.maximum(peak, crush)
-        return np.array([
+        force = np.array([
             self.force(t, k, law, c, r, p) if law.carries(c, p) else 0.0
-            for k, (law, c, r, p) in enumerate(zip(self.laws, crush, rate, peak))
+            for k, (law, c, r, p) in enumerate(zip(self.laws, crush, rate, peak, strict=True))
         ])  # fmt: skip
+        return np.where(self.never_pulls, np.maximum(force, 0.0), force)
 
     def force(self, t: float, element: int, law: Characteristic, crush: float, rate: float, peak: float) -> float:
         """N, of an element that carries."""
