@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .actions import beside_the_springs, coefficients
-from .effects.base import ElementMotion
+from .effects.effect import ElementMotion
 from .estimate import Description, ElementState, Estimate
 from .structure import Element, Structure
 
@@ -43,14 +43,21 @@ class Characteristic(NamedTuple):
     unloading: float | None  # N/m; None: elastic
     damping: float  # N s/m
     tension: bool  # False: carries compression only
+    straight: bool = False  # one stiffness, which holds beyond the crushes that were met as well
+
+    def curve(self, crush: float) -> float:
+        """N, of the loading curve."""
+        if self.straight:
+            return float(self.force[-1] / self.crush[-1] * crush)
+        return float(np.interp(crush, self.crush, self.force))
 
     def spring(self, crush: float, peak: float) -> float:
         """N, at a crush and the largest crush so far, both in m."""
         if not self.tension and crush <= 0.0:
             return 0.0
         if self.unloading is None or crush >= peak:
-            return float(np.interp(crush, self.crush, self.force))
-        force = float(np.interp(peak, self.crush, self.force)) - self.unloading * (peak - crush)
+            return self.curve(crush)
+        force = self.curve(peak) - self.unloading * (peak - crush)
         return force if self.tension and crush < 0.0 else max(force, 0.0)
 
     def carries(self, crush: float, peak: float) -> bool:
@@ -86,7 +93,7 @@ def _characteristic(
     if element.stiffness.shape == "constant" and element.unloading is None:
         stiffness = after[-1].parameters[description.parameters.index(f"{element.name}.stiffness")]
         reach = np.array([-1.0, 0.0, 1.0]) * max(float(np.abs(crush).max(initial=0.0)), 1e-3)
-        return Characteristic(element.name, reach, stiffness * reach, None, damping, element.tension)
+        return Characteristic(element.name, reach, stiffness * reach, None, damping, element.tension, True)
     slope = _unloading(element, crush, force)
     if slope is None:  # all samples lie on one curve, in tension too
         x, f = _curve(crush[~apart], force[~apart])

@@ -1,0 +1,221 @@
+"""The diagnosis against what owes it nothing: finite differences, scipy's solvers, and the free run of the estimators."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares, lsq_linear
+
+from crash_estimator.core.diagnosis.mechanics.linearization import linearise
+from crash_estimator.core.diagnosis.mechanics.outputs import predicted
+from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.diagnosis.output_error.gauss_newton import fit, solve
+from crash_estimator.core.diagnosis.output_error.normal_equations import binned, normal_equations, whitened
+from crash_estimator.core.diagnosis.output_error.problem import OutputErrorProblem, Point, make_problem
+from crash_estimator.core.diagnosis.output_error.simulation import simulate
+from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
+from crash_estimator.core.diagnosis.parameterization.model_terms import additions_of
+from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.effects.applied import applied
+from crash_estimator.core.fold import run
+from crash_estimator.core.free_run import free_run
+from crash_estimator.core.methods import make_estimator
+from crash_estimator.core.structure import Body, Coefficient, EffectSpec, Element, Structure
+from crash_replay.recording import Channel, Recording, Test
+
+STRIKER, PLATE = 100.0, 60.0
+"""kg."""
+FOAM, MOUNT = (8.0e4, 300.0), (1.5e5, 900.0)
+"""N/m and N s/m: between striker and plate, which may part, and between plate and wall."""
+SPEED = 6.0
+"""m/s: the foam is crushed by some 0.15 m, and the striker thrown back."""
+
+RATE = 10_000.0
+
+
+def structure(*effects: EffectSpec, stiffness: Coefficient | None = None) -> Structure:
+    """A striker against a plate on a mount; the foam's stiffness known unless another one is given."""
+    foam = Element(
+        "foam", ("striker", "plate"), stiffness or Coefficient(FOAM[0], shape="constant"), Coefficient(FOAM[1]),
+        tension=False,
+    )  # fmt: skip
+    mount = Element("mount", ("plate", "wall"), Coefficient(MOUNT[0], shape="constant"), Coefficient(MOUNT[1]))
+    bodies = (
+        Body("striker", STRIKER, ("striker_ax",)),
+        Body("plate", PLATE, ("plate_ax",)),
+        Body("wall", fixed=True, force="wall_fx"),
+    )
+    return Structure("striker_and_plate", bodies, (foam, mount), effects)
+
+
+def motion(time: np.ndarray) -> np.ndarray:
+    """(n, 5) acceleration of striker and plate, force on the wall, crush and rate of the foam; by scipy."""
+
+    def forces(x1, v1, x2, v2):
+        crush, rate = x1 - x2, v1 - v2
+        foam = np.where(crush > 0.0, FOAM[0] * crush + FOAM[1] * rate, 0.0)
+        return foam, MOUNT[0] * x2 + MOUNT[1] * v2, crush, rate
+
+    def equations(_, y):
+        foam, mount, *_ = forces(*y)
+        return [y[1], -foam / STRIKER, y[3], (foam - mount) / PLATE]
+
+    found = solve_ivp(equations, (0.0, time[-1]), [0.0, SPEED, 0.0, 0.0], "Radau", time, max_step=2e-5, rtol=1e-9)
+    foam, mount, crush, rate = forces(*found.y)
+    return np.stack([-foam / STRIKER, (foam - mount) / PLATE, mount, crush, rate], axis=1)
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    """The first moves, with a sensor on the plate that no body of the model has."""
+    before, after = np.arange(-200, 0), np.arange(0, 900)
+    true = motion(after / RATE)[:, :3]
+    values = np.concatenate([np.zeros((len(before), 3)), true])
+    values = np.column_stack([values, 1.02 * values[:, 1]])
+    values += np.random.default_rng(1).normal(size=values.shape) * np.array([2.0, 2.0, 50.0, 2.0])
+    channels = (
+        Channel("striker_ax", "acceleration", "striker", "x"),
+        Channel("plate_ax", "acceleration", "plate", "x"),
+        Channel("wall_fx", "force", "wall", "x"),
+        Channel("box_ax", "acceleration", "box", "x"),
+    )
+    time_ns = (np.concatenate([before, after]) * 1e9 / RATE).astype(np.int64)
+    return Recording(Test("striker", channels, initial_velocity={"striker": SPEED}), time_ns, values)
+
+
+EVERY_EFFECT = (
+    EffectSpec("viscous_damping", "foam", 200.0),
+    EffectSpec("quadratic_damping", "foam", 60.0),
+    EffectSpec("coulomb_friction", "mount", 400.0, {"speed": 0.3}),
+    EffectSpec("rate_hardening", "foam", 40.0, {"exponent": 2.0}),
+    EffectSpec("cubic_stiffness", "foam", 2.0e6),
+    EffectSpec("clearance", "foam", 0.02),
+    EffectSpec("bottoming_out", "foam", 8.0e4, {"stop": 0.08}),
+    EffectSpec("plastic_unloading", "foam", 2.5e5),
+    EffectSpec("load_path", "striker-wall", 1.0e4),
+    EffectSpec("added_mass", "plate", 8.0),
+    EffectSpec("constant_force", "striker", 900.0),
+    EffectSpec("unmodelled_body", "box_ax", 6.0, host="plate"),
+    EffectSpec("channel_delay", "plate_ax", 2.5e-4),
+    EffectSpec("channel_gain", "plate_ax", 0.04),
+    EffectSpec("channel_offset", "striker_ax", 5.0),
+)
+
+
+def test_every_effect_of_the_vocabulary_is_looked_at():
+    assert {effect.type for effect in EVERY_EFFECT} == set(EFFECTS)
+
+
+def problem_of(model: Structure, recording: Recording) -> tuple[OutputErrorProblem, Point]:
+    """The problem of a model, and its simulation with the coefficients that it states."""
+    records = [observe(model, recording)]
+    magnitudes = measure_magnitudes(model, records, 12)
+    problem = make_problem(magnitudes, records, additions_of(model, magnitudes, EFFECTS))
+    start = problem.layout.start
+    return problem, simulate(problem, start, problem.measured(start).trajectories)
+
+
+def outputs(problem: OutputErrorProblem, point: Point) -> np.ndarray:
+    """(n, q) at the samples."""
+    (experiment,) = problem.experiments
+    rows = linearise(experiment, point.theta, point.trajectories[0]).rows
+    return predicted(experiment, point.theta, rows)[0][experiment.record.at]
+
+
+def test_the_simulation_is_that_of_an_ode_solver(recording):
+    problem, point = problem_of(structure(), recording)
+    true = motion(recording.time[recording.time_ns >= 0])[:, :3]
+    found = outputs(problem, point)
+    assert_allclose(found[1:], true[1:], atol=2e-3 * np.abs(true).max(axis=0).min(), rtol=2e-3)
+
+
+NEAR = dict.fromkeys(EFFECTS, 0.03) | {"rate_hardening": 0.1}
+"""Share of the derivative's norm: where a contact opens within a step, and, for the power below 1 of rate hardening,
+where the rate passes through zero: its slope there is infinite, and a mean over 2 mm/s stands for it."""
+
+
+@pytest.mark.parametrize("effect", EVERY_EFFECT, ids=lambda effect: effect.type)
+def test_the_derivatives_of_the_outputs_are_their_finite_differences(effect, recording):
+    problem, point = problem_of(structure(effect), recording)
+    (experiment,) = problem.experiments
+    equations = linearise(experiment, point.theta, point.trajectories[0])
+    by_equations = whitened(experiment, point.theta, point.trajectories[0], equations)[:, :, 1:]
+    record, (term,) = experiment.record, problem.layout.terms
+    for parameter in (term.coefficient, *term.shapes.values()):
+        step = 1e-4 * max(abs(point.theta[parameter]), 1e-6)
+        moved = []
+        for sign in (1.0, -1.0):
+            theta = point.theta.copy()
+            theta[parameter] += sign * step
+            moved.append(outputs(problem, simulate(problem, theta, point.trajectories)))
+        slope = np.zeros((len(record.time), moved[0].shape[1]))
+        slope[record.at] = (moved[0] - moved[1]) / (2.0 * step)
+        expected = binned(record, equations.sampling.weight * slope)
+        found = by_equations[:, :, list(equations.columns).index(parameter)]
+        assert np.linalg.norm(expected) > 0.0
+        assert np.linalg.norm(found - expected) < NEAR[effect.type] * np.linalg.norm(expected)
+
+
+IN_BOTH_FREE_RUNS = [effect for effect in EVERY_EFFECT if not effect.type.startswith("channel_")]
+
+
+@pytest.mark.parametrize("pulls", [True, False])
+@pytest.mark.parametrize("effect", [None, *IN_BOTH_FREE_RUNS], ids=lambda effect: effect.type if effect else "none")
+def test_the_two_free_runs_agree(effect, pulls, recording):
+    """The diagnosis's simulation and the estimators' free run, of one model with the same constants."""
+    model = structure(*([effect] if effect else []))
+    foam = replace(model.elements[0], damper_pulls=pulls)
+    model = replace(model, elements=(foam, model.elements[1]))
+    one = outputs(*problem_of(model, recording))
+    estimator = make_estimator(model, recording.test, "rls")
+    other = free_run(applied(model, recording.test), estimator.description, run(estimator, recording.samples()))
+    # at the impact itself, where forces jump, one is on this side of it and the other on that
+    error = (one - other.predicted)[2:]
+    assert np.all(np.sqrt(np.mean(error**2, axis=0)) < 0.002 * np.abs(one).max(axis=0))
+
+
+def test_a_step_is_the_bounded_least_squares_solution(recording):
+    """`solve` goes through an active set of its own; scipy's through another."""
+    problem, point = problem_of(structure(EffectSpec("viscous_damping", "foam", 200.0)), recording)
+    layout = problem.layout
+    normal, _ = normal_equations(problem, point)
+    term = layout.terms[0]
+    tight = layout.prior._replace(
+        low=np.where(np.arange(layout.size) == term.coefficient, point.theta - 1.0, layout.prior.low),
+    )
+    bounded = layout._replace(prior=tight)
+    step = solve(bounded, normal, point.theta)
+    assert step.delta[term.coefficient] == pytest.approx(-1.0), "the limit binds: else this shows less"
+    root = np.linalg.cholesky(normal.matrix + tight.precision + 1e-12 * np.diag(np.diag(tight.precision))).T
+    pull = normal.vector - tight.precision @ (point.theta - tight.mean)
+    scale = 1.0 / np.sqrt(np.diagonal(normal.matrix + tight.precision))
+    limits = (
+        np.clip((tight.low - point.theta) / scale, -1e12, None),
+        np.clip((tight.high - point.theta) / scale, None, 1e12),
+    )
+    best = lsq_linear(root * scale, np.linalg.solve(root.T, pull), limits, method="bvls", tol=1e-14)
+    assert_allclose(step.delta / scale, best.x, atol=1e-5 * np.abs(best.x).max())
+
+
+def test_a_fit_ends_where_scipys_least_squares_does(recording):
+    """Stiffness of the foam and nuisances: the same posterior mode from another start by another method."""
+    model = structure(stiffness=Coefficient(1.0, estimated=True, min=0.0, shape="constant"))
+    records = [observe(model, recording)]
+    problem = make_problem(measure_magnitudes(model, records, 12), records, ())
+    found = fit(problem)
+    (experiment,), prior = problem.experiments, problem.layout.prior
+    root = np.linalg.cholesky(prior.precision).T
+    scale = np.sqrt(np.diagonal(found.covariance))
+
+    def residuals(u: np.ndarray) -> np.ndarray:
+        theta = found.theta + scale * u
+        point = simulate(problem, theta, found.trajectories)
+        left = whitened(experiment, theta, point.trajectories[0], linearise(experiment, theta, point.trajectories[0]))
+        return np.concatenate([left[:, :, 0].ravel(), root @ (theta - prior.mean)])
+
+    start = np.full(problem.layout.size, 1.5)
+    best = least_squares(residuals, start, x_scale="jac", diff_step=1e-4)
+    assert found.cost == pytest.approx(2.0 * best.cost, abs=0.05)
+    assert np.abs(best.x).max() < 0.1, "in standard deviations of the fit's own covariance"
