@@ -8,7 +8,6 @@ from dataclasses import replace
 from fnmatch import fnmatchcase
 
 import numpy as np
-from scipy.signal import filtfilt
 
 from .recording import Recording, RecordingError
 
@@ -70,6 +69,8 @@ def cfc_filter(values: np.ndarray, sample_period: float, cfc: int) -> np.ndarray
     against start-up transients. Raises RecordingError for a class that the standard has not got, or a
     sample rate below ten times the class.
     """
+    from scipy.signal import filtfilt  # it takes longer to import than all the rest: only who filters waits for it
+
     if cfc not in CFC_CLASSES:
         raise RecordingError(f"CFC must be one of {', '.join(map(str, CFC_CLASSES))}, got {cfc}")
     if not 0.0 < sample_period * cfc * RATE_PER_CFC <= 1.0 + STEADY:

@@ -1,6 +1,7 @@
 """Effects at work in the regression: what each adds to the equations for one unit of its coefficient.
 
     element   a force f(motion) in parallel to an element that carries
+    memory    a force z in parallel to an element that carries; z hangs on the way that its crush has gone
     factor    c h(V) times the element's static force
     body      an external force f(t) on a body, from time zero on
     inertia   a carried body m resists with -m a what its carrier makes of it
@@ -75,6 +76,8 @@ class Actions:
             k = action.at
             if action.kind == "factor":
                 per_unit[k, j] = static[k] * action.force(motion.rate[[k]])[0]
+            elif action.kind == "memory" and law.carries[k]:
+                per_unit[k, j] = law.memory[j]
             elif action.kind == "element" and law.carries[k]:
                 here = ElementMotion(
                     *(np.array([x]) for x in (motion.time, motion.crush[k], motion.rate[k], law.peak[k], static[k]))
@@ -182,15 +185,27 @@ def coefficients(structure: Structure, description: Description, last: Estimate)
 
 
 def beside_the_springs(
-    structure: Structure, c: np.ndarray, element: int, motion: ElementMotion
+    structure: Structure, c: np.ndarray, element: int, motion: ElementMotion, remembered: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(g,) N in parallel to an element that carries, and (g,) a factor on its static force; c of each action."""
+    """(g,) N in parallel to an element that carries, and (g,) a factor on its static force; c of each action.
+
+    remembered (n,): what each action remembers, at one instant; None: the motion is from first contact on.
+    """
     given = structure.elements[element].factor
     parallel = np.zeros_like(motion.crush)
     factor = np.ones_like(parallel) if given is None else given(motion.rate)
-    for value, action in zip(c, structure.actions):
+    for j, (value, action) in enumerate(zip(c, structure.actions, strict=True)):
         if action.at == element and action.kind == "element":
             parallel = parallel + value * action.force(motion)
+        elif action.at == element and action.kind == "memory":
+            parallel = parallel + value * (trace(structure, action, motion) if remembered is None else remembered[j])
         elif action.at == element and action.kind == "factor":
             factor = factor * (1.0 + value * action.force(motion.rate))
     return parallel, factor
+
+
+def trace(structure: Structure, action: Action, motion: ElementMotion) -> np.ndarray:
+    """(g,) What an action of kind "memory" remembers along a motion from first contact on."""
+    tension = structure.elements[action.at].tension
+    crush = motion.crush if tension else np.maximum(motion.crush, 0.0)
+    return action.force(np.concatenate([[0.0], crush]), 0.0)[0][1:]

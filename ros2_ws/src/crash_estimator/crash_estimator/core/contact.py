@@ -27,6 +27,8 @@ class ContactState(NamedTuple):
     peak_crush: np.ndarray  # (e,) m, the largest so far, never below 0
     peak_rate: np.ndarray  # (e,) m/s, the largest magnitude so far
     state: np.ndarray  # (e,) ElementState
+    crush: np.ndarray  # (e,) m, at the last sample; 0 where apart without tension
+    memory: np.ndarray  # (n,) of each action that remembers the way its element's crush has gone; else 0
 
 
 class SpringLaw(NamedTuple):
@@ -37,6 +39,7 @@ class SpringLaw(NamedTuple):
     carries: np.ndarray  # (e,) False when apart
     on_line: np.ndarray  # (e,) True on an unloading line
     peak: np.ndarray  # (e,) m, the largest crush so far
+    memory: np.ndarray  # (n,) of each action
 
 
 class Contact:
@@ -49,10 +52,12 @@ class Contact:
         slopes = [element.unloading_slope for element in structure.elements]  # of the estimated ones, at first
         self.unloading = np.array([e.unloading or (s.value if s else 0.0) for e, s in zip(structure.elements, slopes)])
         self.plastic = self.unloading > 0.0
+        self.actions = structure.actions
 
     def init(self) -> ContactState:
         n = len(self.names)
-        return ContactState(np.zeros(n), np.zeros(n), np.full(n, ElementState.APART, dtype=np.uint8))
+        apart = np.full(n, ElementState.APART, dtype=np.uint8)
+        return ContactState(np.zeros(n), np.zeros(n), apart, np.zeros(n), np.zeros(len(self.actions)))
 
     def step(
         self,
@@ -66,7 +71,7 @@ class Contact:
         damping (e,): the latest, N s/m, which counts where a damper never pulls."""
         if motion.time < 0.0:
             nothing, none = np.zeros(len(self.names)), np.zeros(len(self.names), dtype=bool)
-            return before, SpringLaw(nothing, nothing, none, none, before.peak_crush), ()
+            return before, SpringLaw(nothing, nothing, none, none, before.peak_crush, before.memory), ()
         crush, peak = motion.crush, np.maximum(before.peak_crush, motion.crush)
         on_line = self.plastic & (crush < peak)
         lever = np.where(on_line, peak, crush)
@@ -81,8 +86,20 @@ class Contact:
         unloads = np.where(self.plastic, on_line, turned)
         state = np.where(apart, ElementState.APART, np.where(unloads, ElementState.UNLOADING, ElementState.LOADING))
         state = state.astype(np.uint8)
-        law = SpringLaw(np.where(apart, 0.0, lever), np.where(apart, 0.0, shift), ~apart, on_line & ~apart, peak)
-        return ContactState(peak, peak_rate, state), law, self._events(before.state, state, crush)
+        pressed = np.where(self.compression_only, np.maximum(crush, 0.0), crush)
+        memory = self._remembered(before, pressed)
+        law = SpringLaw(
+            np.where(apart, 0.0, lever), np.where(apart, 0.0, shift), ~apart, on_line & ~apart, peak, memory
+        )
+        return ContactState(peak, peak_rate, state, pressed, memory), law, self._events(before.state, state, crush)
+
+    def _remembered(self, before: ContactState, crush: np.ndarray) -> np.ndarray:
+        memory = before.memory.copy()
+        for j, action in enumerate(self.actions):
+            if action.kind == "memory":
+                way = np.array([before.crush[action.at], crush[action.at]])
+                memory[j] = action.force(way, before.memory[j])[0][-1]
+        return memory
 
     def _events(self, before: np.ndarray, after: np.ndarray, crush: np.ndarray) -> tuple[Event, ...]:
         if (before == after).all():

@@ -66,28 +66,38 @@ def free_run(
     time = np.array([e.time_ns for e in after]) * 1e-9
     run = _System(structure, laws, coefficients(structure, description, after[-1]), time, after)
     x, v = after[0].displacement.copy(), after[0].velocity.copy()
-    peak = run.largest(np.zeros(len(laws)), time[0], x)
-    states = [(x, v, peak)]
+    state = run.start(time[0], x, v)
+    states = [state]
     for start, stop in zip(time[:-1], time[1:]):
         steps = int(np.ceil((stop - start) / LONGEST_STEP - 1e-9))
         h = (stop - start) / steps
         for k in range(steps):
-            x, v, peak = run.step(start + k * h, h, x, v, peak)
-        states.append((x, v, peak))
-    loads = np.array([run.loads(t, *state) for t, state in zip(time, states)])
+            state = run.step(start + k * h, h, state)
+        states.append(state)
+    loads = np.array([run.loads(t, state) for t, state in zip(time, states, strict=True)])
     acceleration = np.array([run.accelerations(t, load) for t, load in zip(time, loads)])
-    force = np.array([run.forces(t, *state) for t, state in zip(time, states)])
+    force = np.array([run.forces(t, state) for t, state in zip(time, states, strict=True)])
     return FreeRun(
         time=time,
-        displacement=np.array([state[0] for state in states]),
-        velocity=np.array([state[1] for state in states]),
+        displacement=np.array([state.x for state in states]),
+        velocity=np.array([state.v for state in states]),
         acceleration=acceleration,
-        crush=np.array([run.motion(t, x, v)[0] for t, (x, v, _) in zip(time, states)]),
+        crush=np.array([run.motion(t, state.x, state.v)[0] for t, state in zip(time, states, strict=True)]),
         force=force,
         predicted=run.recorded(acceleration, loads),
         measured=np.array([e.measured for e in after]),
         measured_velocity=np.array([e.velocity for e in after]),
     )
+
+
+class _State(NamedTuple):
+    """At the end of a step."""
+
+    x: np.ndarray  # (b,) m
+    v: np.ndarray  # (b,) m/s
+    peak: np.ndarray  # (e,) m, largest crush so far
+    crush: np.ndarray  # (e,) m; 0 where apart without tension
+    memory: np.ndarray  # (n,) of each action that remembers the way its element's crush has gone; else 0
 
 
 class _System:
@@ -108,7 +118,9 @@ class _System:
         self.carried = [(k, structure.body_index[b.carried_by]) for k, b in enumerate(structure.bodies) if b.carried_by]
         self.origin = np.array([e.origin for e in structure.elements])
         self.never_pulls = np.array([not (e.tension or e.damper_pulls) for e in structure.elements], dtype=bool)
-        self.acts = {a.at for a in structure.actions if a.kind in ("element", "factor")}
+        self.acts = {a.at for a in structure.actions if a.kind in ("element", "memory", "factor")}
+        self.remembering = [(j, a) for j, a in enumerate(structure.actions) if a.kind == "memory"]
+        self.pressed_only = np.array([not e.tension for e in structure.elements], dtype=bool)
         self.acts |= {k for k, e in enumerate(structure.elements) if e.factor}
         self.driven = [k for k, body in enumerate(structure.bodies) if body.driven]
         self.given = [k for k, element in enumerate(structure.elements) if element.displacement]
@@ -125,30 +137,50 @@ class _System:
             crush[k], rate[k] = np.interp(t, self.time, self.crushes[k]), np.interp(t, self.time, self.rates[k])
         return crush, rate
 
-    def largest(self, peak: np.ndarray, t: float, x: np.ndarray) -> np.ndarray:
-        return np.maximum(peak, self.motion(t, x, x)[0])
+    def start(self, t: float, x: np.ndarray, v: np.ndarray) -> _State:
+        nothing = np.zeros(len(self.laws))
+        return self.ended(t, x, v, _State(x, v, nothing, nothing, np.zeros(len(self.c))))
 
-    def forces(self, t: float, x: np.ndarray, v: np.ndarray, peak: np.ndarray) -> np.ndarray:
-        crush, rate = self.motion(t, x, v)
-        peak = np.maximum(peak, crush)
+    def ended(self, t: float, x: np.ndarray, v: np.ndarray, before: _State) -> _State:
+        """The state at the end of a step: the largest crush and the memories follow there."""
+        crush = self.motion(t, x, v)[0]
+        memory = self.remembered(before, crush)
+        return _State(x, v, np.maximum(before.peak, crush), self.pressed(crush), memory)
+
+    def pressed(self, crush: np.ndarray) -> np.ndarray:
+        return np.where(self.pressed_only, np.maximum(crush, 0.0), crush)
+
+    def remembered(self, before: _State, crush: np.ndarray) -> np.ndarray:
+        """(n,) what the actions remember at a crush within the step, or at its end."""
+        memory = before.memory.copy()
+        for j, action in self.remembering:
+            way = np.array([before.crush[action.at], self.pressed(crush)[action.at]])
+            memory[j] = action.force(way, before.memory[j])[0][-1]
+        return memory
+
+    def forces(self, t: float, state: _State) -> np.ndarray:
+        """(e,) N; x and v of the state may be within a step, the rest is of its beginning."""
+        crush, rate = self.motion(t, state.x, state.v)
+        memory = self.remembered(state, crush)
+        peak = np.maximum(state.peak, crush)
         force = np.array([
-            self.force(t, k, law, c, r, p) if law.carries(c, p) else 0.0
+            self.force(k, law, ElementMotion(t, c, r, p, 0.0), memory) if law.carries(c, p) else 0.0
             for k, (law, c, r, p) in enumerate(zip(self.laws, crush, rate, peak, strict=True))
         ])  # fmt: skip
         return np.where(self.never_pulls, np.maximum(force, 0.0), force)
 
-    def force(self, t: float, element: int, law: Characteristic, crush: float, rate: float, peak: float) -> float:
-        """N, of an element that carries."""
-        spring, damper = law.spring(crush, peak), law.damping * rate
+    def force(self, element: int, law: Characteristic, motion: ElementMotion, memory: np.ndarray) -> float:
+        """N, of an element that carries, at one instant."""
+        spring, damper = law.spring(motion.crush, motion.peak), law.damping * motion.rate
         if element not in self.acts:
             return spring + damper
-        motion = ElementMotion(*(np.array([value]) for value in (t, crush, rate, peak, spring)))
-        parallel, factor = beside_the_springs(self.structure, self.c, element, motion)
+        instant = ElementMotion(*(np.array([value]) for value in motion._replace(static=spring)))
+        parallel, factor = beside_the_springs(self.structure, self.c, element, instant, memory)
         return float(spring * factor[0] + damper + parallel[0])
 
-    def loads(self, t: float, x: np.ndarray, v: np.ndarray, peak: np.ndarray) -> np.ndarray:
+    def loads(self, t: float, state: _State) -> np.ndarray:
         """(b,) N: the elements' forces on each body, what it carries included, and what the effects add."""
-        force, loads = self.forces(t, x, v, peak), np.zeros(len(x))
+        force, loads = self.forces(t, state), np.zeros(len(state.x))
         np.subtract.at(loads, self.ends[:, 0], force)
         np.add.at(loads, self.ends[:, 1], force)
         for k, host in self.carried:
@@ -177,20 +209,21 @@ class _System:
             acceleration[k] = np.interp(t, self.time, self.driving[k])
         return acceleration
 
-    def pushed(self, t: float, x: np.ndarray, v: np.ndarray, peak: np.ndarray) -> np.ndarray:
-        return self.accelerations(t, self.loads(t, x, v, peak))
+    def pushed(self, t: float, state: _State) -> np.ndarray:
+        return self.accelerations(t, self.loads(t, state))
 
-    def step(self, t: float, h: float, x: np.ndarray, v: np.ndarray, peak: np.ndarray) -> tuple[np.ndarray, ...]:
-        """One Runge-Kutta step of h s; the largest crush follows at its end."""
-        a1 = self.pushed(t, x, v, peak)
+    def step(self, t: float, h: float, state: _State) -> _State:
+        """One Runge-Kutta step of h s."""
+        x, v = state.x, state.v
+        a1 = self.pushed(t, state)
         v2 = v + 0.5 * h * a1
-        a2 = self.pushed(t + 0.5 * h, x + 0.5 * h * v, v2, peak)
+        a2 = self.pushed(t + 0.5 * h, state._replace(x=x + 0.5 * h * v, v=v2))
         v3 = v + 0.5 * h * a2
-        a3 = self.pushed(t + 0.5 * h, x + 0.5 * h * v2, v3, peak)
+        a3 = self.pushed(t + 0.5 * h, state._replace(x=x + 0.5 * h * v2, v=v3))
         v4 = v + h * a3
-        a4 = self.pushed(t + h, x + h * v3, v4, peak)
+        a4 = self.pushed(t + h, state._replace(x=x + h * v3, v=v4))
         x, v = x + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4), v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
-        return x, v, self.largest(peak, t + h, x)
+        return self.ended(t + h, x, v, state)
 
 
 def _bridged(values: np.ndarray) -> np.ndarray:

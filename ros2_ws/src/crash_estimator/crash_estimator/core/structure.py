@@ -122,11 +122,13 @@ class Action:
 
     name: str  # of its parameter, such as door_rib.coulomb_friction
     unit: str
-    kind: str  # element, factor, body, inertia, mass, gain or offset
+    kind: str  # element, memory, factor, body, inertia, mass, gain or offset
     at: int  # the element, or the body: of "inertia" the one that feels it
     coefficient: Coefficient
     scale: float  # order of magnitude of the coefficient
-    force: Callable | None = None  # element: ElementMotion -> (g,), factor: rate (g,) -> h, body: time (g,) s -> N
+    force: Callable | None = (
+        None  # element: ElementMotion -> (g,), memory: see `HystereticForce`, factor: rate (g,) -> h, body: time (g,) s -> N
+    )
     body: int = -1  # inertia: whose
     lighter: int = -1  # inertia: the body whose mass it was counted in, -1: none
     share: float = 1.0  # gain, offset: of the channel in its body's acceleration
@@ -227,7 +229,9 @@ class Structure:
     def parameters(self) -> tuple[Parameter, ...]:
         """Those of the elements, then one for each action."""
         return self.element_parameters + tuple(
-            Parameter(a.name, a.unit, a.at if a.kind in ("element", "factor") else -1, False, a.coefficient, a.scale)
+            Parameter(
+                a.name, a.unit, a.at if a.kind in ("element", "memory", "factor") else -1, False, a.coefficient, a.scale
+            )
             for a in self.actions
         )
 

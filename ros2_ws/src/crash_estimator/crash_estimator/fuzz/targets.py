@@ -172,7 +172,7 @@ def _take_effect(folder: Path) -> None:
         if effect.function:
             shapes = {name: shape.starts[-1] for name, shape in effect.shapes.items()}
             with np.errstate(all="ignore"):
-                getattr(effect, effect.function)(effect.trial_argument(motion), **shapes)
+                effect.trial(motion, **shapes)
 
 
 REQUEST = AddEffect.Request(effect="coulomb_friction", target="rib_spine", options=["coefficient=1810", "speed=0.1"])

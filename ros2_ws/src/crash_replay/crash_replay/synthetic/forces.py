@@ -17,6 +17,15 @@ Law = Callable[[float, float, float], float]
 
 
 @dataclass(frozen=True)
+class Slip:
+    """A force beside the spring with a memory s of its own, force times s, that follows ds/dt = flow(s, V)."""
+
+    force: float  # N, at which it yields
+    flow: Callable[[float, float], float]  # (s from -1 to 1, rate m/s) -> 1/s
+    both_ways: bool = True  # False: it lets go where the element is apart, and stays as it was
+
+
+@dataclass(frozen=True)
 class Spring:
     """A spring given by its secant stiffness K:  F = K(|X|) X  while it loads.
 

@@ -23,6 +23,7 @@ class State(NamedTuple):
     x: list[float]  # (b,) m
     v: list[float]  # (b,) m/s
     peak: list[float]  # (e,) m, the largest crush so far, never below 0
+    slipped: list[float]  # (e,) what each element's slip remembers; 0 without one
 
 
 class History(NamedTuple):
@@ -52,6 +53,8 @@ class _Equations:
         pushed = [body.push(grid) if body.push else still for body in system.bodies]
         self.pushed = np.stack(pushed, axis=1).tolist()
         self.links = [(a, b, element.force) for (a, b), element in zip(system.ends(), system.elements)]
+        self.slips = [element.slips if element.slip else None for element in system.elements]
+        self.remembers = any(self.slips)
 
     def crush(self, x: list[float]) -> list[float]:
         return [x[a] - x[b] for a, b, _ in self.links]
@@ -59,8 +62,16 @@ class _Equations:
     def largest(self, peak: list[float], x: list[float]) -> list[float]:
         return list(map(max, peak, self.crush(x)))
 
-    def forces(self, x: list[float], v: list[float], peak: list[float]) -> list[float]:
-        return [law(x[a] - x[b], v[a] - v[b], p) for (a, b, law), p in zip(self.links, self.largest(peak, x))]
+    def forces(self, state: State) -> list[float]:
+        x, v, peak, slipped = state
+        each = zip(self.links, self.largest(peak, x), slipped)
+        return [law(x[a] - x[b], v[a] - v[b], p, s) for (a, b, law), p, s in each]
+
+    def flows(self, state: State) -> list[float]:
+        """(e,) 1/s, of what the slips remember."""
+        x, v, _, slipped = state
+        each = zip(self.links, self.slips, slipped)
+        return [slips(x[a] - x[b], v[a] - v[b], s) if slips else 0.0 for (a, b, _), slips, s in each]
 
     def loads(self, forces: list[float]) -> list[float]:
         loads = [0.0] * self.bodies
@@ -69,8 +80,8 @@ class _Equations:
             loads[b] += force
         return loads
 
-    def accelerations(self, node: int, x: list[float], v: list[float], peak: list[float]) -> list[float]:
-        loads = self.loads(self.forces(x, v, peak))
+    def accelerations(self, node: int, state: State) -> list[float]:
+        loads = self.loads(self.forces(state))
         columns = zip(loads, self.pushed[node], self.masses[node], self.driven[node])
         return [(load + push) / mass if mass else given for load, push, mass, given in columns]
 
@@ -81,7 +92,8 @@ def simulate(system: System, time: np.ndarray, max_step: float = MAX_STEP) -> Hi
     spans = [np.linspace(start, end, 2 * n, endpoint=False) for start, end, n in zip(time, time[1:], steps)]
     equations = _Equations(system, np.concatenate([*spans, time[-1:]]))
     x, v = [body.displacement for body in system.bodies], [body.velocity for body in system.bodies]
-    state, node = State(x, v, equations.largest([0.0] * len(system.elements), x)), 0
+    nothing = [0.0] * len(system.elements)
+    state, node = State(x, v, equations.largest(nothing, x), nothing), 0
     nodes, states = [node], [state]
     for dt, count in zip(np.diff(time).tolist(), steps):
         for _ in range(count):
@@ -93,16 +105,25 @@ def simulate(system: System, time: np.ndarray, max_step: float = MAX_STEP) -> Hi
 
 def _step(equations: _Equations, node: int, state: State, h: float) -> State:
     """One step h (s) from the grid's `node` to node + 2."""
-    x, v, peak = state
-    a1 = equations.accelerations(node, x, v, peak)
-    v2 = _moved(v, 0.5 * h, a1)
-    a2 = equations.accelerations(node + 1, _moved(x, 0.5 * h, v), v2, peak)
-    v3 = _moved(v, 0.5 * h, a2)
-    a3 = equations.accelerations(node + 1, _moved(x, 0.5 * h, v2), v3, peak)
-    v4 = _moved(v, h, a3)
-    a4 = equations.accelerations(node + 2, _moved(x, h, v3), v4, peak)
-    x = _moved(x, h / 6.0, _weighted(v, v2, v3, v4))
-    return State(x, _moved(v, h / 6.0, _weighted(a1, a2, a3, a4)), equations.largest(peak, x))
+    x, v, peak, slipped = state
+
+    def slope(at: State, of: int) -> State:
+        """(velocities, accelerations, -, flows) there."""
+        flows = equations.flows(at) if equations.remembers else slipped
+        return State(at.v, equations.accelerations(of, at), peak, flows)
+
+    def ahead(step: float, by: State) -> State:
+        flowed = _moved(slipped, step, by.slipped) if equations.remembers else slipped
+        return State(_moved(x, step, by.x), _moved(v, step, by.v), peak, flowed)
+
+    k1 = slope(state, node)
+    k2 = slope(ahead(0.5 * h, k1), node + 1)
+    k3 = slope(ahead(0.5 * h, k2), node + 1)
+    k4 = slope(ahead(h, k3), node + 2)
+    mean = State(*(_weighted(*each) for each in zip(k1, k2, k3, k4)))
+    end = ahead(h / 6.0, mean)
+    bounded = [min(max(s, -1.0), 1.0) for s in end.slipped] if equations.remembers else slipped
+    return State(end.x, end.v, equations.largest(peak, end.x), bounded)
 
 
 def _moved(start: list[float], h: float, slope: list[float]) -> list[float]:
@@ -114,13 +135,13 @@ def _weighted(k1: list[float], k2: list[float], k3: list[float], k4: list[float]
 
 
 def _history(equations: _Equations, time: np.ndarray, nodes: list[int], states: list[State]) -> History:
-    x, v, peak = (np.array(column) for column in zip(*states))
-    force = np.array([equations.forces(*state) for state in states])
+    x, v, peak, _ = (np.array(column) for column in zip(*states))
+    force = np.array([equations.forces(state) for state in states])
     return History(
         time=time,
         displacement=x,
         velocity=v,
-        acceleration=np.array([equations.accelerations(node, *state) for node, state in zip(nodes, states)]),
+        acceleration=np.array([equations.accelerations(node, state) for node, state in zip(nodes, states)]),
         load=np.array([equations.loads(row) for row in force.tolist()]),
         crush=np.array([equations.crush(state.x) for state in states]),
         rate=np.array([equations.crush(state.v) for state in states]),

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from .forces import Law
+from .forces import Law, Slip
 
 
 class Motion:
@@ -54,13 +54,22 @@ class Element:
     spring: Law
     damping: float = 0.0  # C, N s/m, both ways
     others: tuple[Law, ...] = ()
+    slip: Slip | None = None
 
-    def force(self, crush: float, rate: float, peak: float) -> float:
-        """N, compression positive."""
+    def force(self, crush: float, rate: float, peak: float, slipped: float = 0.0) -> float:
+        """N, compression positive; slipped: what the slip remembers, from -1 to 1."""
         force = self.spring(crush, rate, peak) + self.damping * rate
         for law in self.others:
             force += law(crush, rate, peak)
+        if self.slip and (self.slip.both_ways or crush > 0.0):
+            force += self.slip.force * slipped
         return force
+
+    def slips(self, crush: float, rate: float, slipped: float) -> float:
+        """1/s, at which what the slip remembers changes; nothing while the element is apart."""
+        if self.slip is None or not (self.slip.both_ways or crush > 0.0):
+            return 0.0
+        return self.slip.flow(slipped, rate)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from .kinds import (
     ChannelError,
     ElementForce,
     Gap,
+    HystereticForce,
     PairSpring,
     StaticFactor,
     UnloadingSlope,
@@ -15,5 +16,5 @@ from .kinds import (
 
 __all__ = [
     "Addition", "AttachedBody", "BodyForce", "BodyInertia", "ChannelError", "Effect", "ElementForce", "ElementMotion",
-    "Gap", "PairSpring", "Shape", "StaticFactor", "UnloadingSlope",
+    "Gap", "HystereticForce", "PairSpring", "Shape", "StaticFactor", "UnloadingSlope",
 ]  # fmt: skip

@@ -14,7 +14,7 @@ whole records (arrays) and read the history, which is made once, causally, elsew
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -74,6 +74,7 @@ class Effect:
     # Its place in an element's force
     in_parallel: ClassVar[bool] = False  # c f(motion) beside the spring
     scales_static: ClassVar[bool] = False  # 1 + c h(V) times the spring
+    remembers: ClassVar[bool] = False  # c z beside the spring, z hangs on the way that the crush has gone
     changes_law: ClassVar[bool] = False  # a constant of the spring's law itself, in which the force is not linear
     compression_only: ClassVar[bool] = False  # an element that has it carries no tension
 
@@ -96,9 +97,9 @@ class Effect:
         """Of the coefficient as a model file states it."""
         return self.low, self.high
 
-    def trial_argument(self, motion: ElementMotion) -> Any:
-        """What its function is given, of a motion that a user's effect is tried on."""
-        return motion
+    def trial(self, motion: ElementMotion, **shapes: float) -> np.ndarray:
+        """What its function gives on a motion that a user's effect is tried on."""
+        return getattr(self, self.function)(motion, **shapes)
 
     def put_to_work(self, structure: Structure, test: Test, spec: EffectSpec) -> Structure:
         """The structure as estimators and free runs take it: with this effect in its elements, masses or actions.

@@ -60,7 +60,7 @@ def _checked(path: str | Path, effect: Effect) -> Effect:
     guarded = replace(
         effect, **{function: _guarded(f"{path}: {function} of {effect.name!r}", getattr(effect, function))}
     )
-    _try_out(f"{path}: {function} of {effect.name!r}", guarded, function)
+    _try_out(f"{path}: {function} of {effect.name!r}", guarded)
     return guarded
 
 
@@ -109,14 +109,14 @@ def _said(error: BaseException) -> str:
     return f"{what}: {' '.join(str(error).split())[:200]}"
 
 
-def _try_out(where: str, effect: Effect, function: str) -> None:
+def _try_out(where: str, effect: Effect) -> None:
     time = np.linspace(0.0, 0.1, INSTANTS)
     crush = LARGEST_CRUSH * np.sin(40.0 * time)
     peak, rate = np.maximum.accumulate(crush), np.gradient(crush, time)
-    argument = effect.trial_argument(ElementMotion(time, crush, rate, peak, 1e5 * np.maximum(crush, 0.0)))
+    motion = ElementMotion(time, crush, rate, peak, 1e5 * np.maximum(crush, 0.0))
     shapes = {n: s.starts[0] * (LARGEST_CRUSH if s.of_crush else 1.0) for n, s in effect.shapes.items()}
     with np.errstate(all="ignore"):
-        values = getattr(effect, function)(argument, **shapes)
+        values = effect.trial(motion, **shapes)
     bad = np.flatnonzero(~(np.abs(values) <= NUMBER.highest))
     if len(bad):
         at = f"crush {crush[bad[0]]:.3g} m, rate {rate[bad[0]]:.3g} m/s"

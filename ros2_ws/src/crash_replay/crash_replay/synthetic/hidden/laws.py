@@ -66,6 +66,18 @@ class Carrier:
         return force
 
 
+def bouc_wen(crush: float, sharpness: float) -> Callable[[float, float], float]:
+    """ds/dt = V (1 - |s|^n) / X_y while it yields further, V / X_y on the way back (Wen 1976, A = 1, beta = gamma)."""
+    return lambda s, rate: rate / crush * (1.0 - abs(s) ** sharpness if s * rate > 0.0 else 1.0)
+
+
+def two_sliders(crush: float, share: float) -> Callable[[float, float], float]:
+    """Two dry sliders behind springs, one that gives way early (Iwan 1966), as one curve of three straight parts:
+    up to `share` of the force the spring of both, then that of the second alone."""
+    early, late = 2.0 / crush, 2.0 * (1.0 - share) / (crush * (2.0 - share))
+    return lambda s, rate: rate * (early if s * rate <= 0.0 or abs(s) < share else late if abs(s) < 1.0 else 0.0)
+
+
 def quadratic_damping(c: float) -> Parallel:
     return lambda crush, rate: c * rate * abs(rate)
 

@@ -51,7 +51,7 @@ PUSH = 0.001
 """Of an element's peak force: as little as the integration resolves, for the answer is not linear for long."""
 
 ON_ELEMENTS = (
-    "viscous_damping", "quadratic_damping", "coulomb_friction", "rate_hardening", "cubic_stiffness", "bottoming_out",
+    "viscous_damping", "quadratic_damping", "coulomb_friction", "hysteresis", "rate_hardening", "cubic_stiffness", "bottoming_out",
     "clearance", "plastic_unloading",
 )  # fmt: skip
 
@@ -95,7 +95,7 @@ def targets(specimen: Specimen, peaks: Peaks, effect: str) -> list[str]:
     carrying = [e for e in peaks.force if peaks.force[e] >= CARRIES * strongest and peaks.travel[e] >= MOVES]
     pressed = [e for e in carrying if peaks.crush[e] >= MOVES]
     match effect:
-        case "viscous_damping" | "quadratic_damping" | "coulomb_friction":
+        case "viscous_damping" | "quadratic_damping" | "coulomb_friction" | "hysteresis":
             return carrying
         case "rate_hardening":
             return pressed

@@ -1,4 +1,4 @@
-"""The fifteen effects of the vocabulary, hidden in a specimen.
+"""The sixteen effects of the vocabulary, hidden in a specimen.
 
 A function gets the specimen, its peaks without the effect, the target, a share and a stream of random numbers,
 and gives the specimen with the effect and what was hidden. The share is the effect's size: about what it
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.constants import g as G
 
+from ..forces import Slip
 from ..sensors import accelerometer
 from ..system import Body, Element
 from . import laws
@@ -55,6 +56,20 @@ def coulomb_friction(specimen, peaks, target, share, rng):
     c, speed = 0.7 * share * peaks.force[target], float(rng.choice([0.05, 0.1, 0.2]))
     hidden = Hidden("coulomb_friction", target, c, "N", {"speed": speed})
     return _parallel(specimen, target, laws.coulomb_friction(c, speed)), hidden
+
+
+def hysteresis(specimen, peaks, target, share, rng):
+    """As Bouc and Wen have it, or two dry sliders behind springs."""
+    c = 0.7 * share * peaks.force[target]
+    yields = float(rng.uniform(0.05, 0.2)) * max(peaks.crush[target], 0.3 * peaks.travel[target])
+    if rng.random() < 0.5:
+        exponent = float(rng.choice([1.0, 2.0, 4.0]))
+        flow, shape = laws.bouc_wen(yields, exponent), {"yield_crush": yields, "exponent": exponent}
+    else:
+        flow, shape = laws.two_sliders(yields, 0.5), {"yield_crush": yields}
+    slip = Slip(c, flow, both_ways=specimen.element(target).spring.tension)
+    elements = [replace(e, slip=slip) if e.name == target else e for e in specimen.scenario.system.elements]
+    return specimen.with_parts(elements=elements), Hidden("hysteresis", target, c, "N", shape)
 
 
 def rate_hardening(specimen, peaks, target, share, rng):
@@ -155,7 +170,8 @@ def channel_offset(specimen, peaks, target, share, rng):
 VOCABULARY: Mapping[str, Hide] = {
     hide.__name__: hide
     for hide in (
-        viscous_damping, quadratic_damping, coulomb_friction, rate_hardening, cubic_stiffness, clearance, bottoming_out,
+        viscous_damping, quadratic_damping, coulomb_friction, hysteresis, rate_hardening, cubic_stiffness, clearance,
+        bottoming_out,
         plastic_unloading, load_path, added_mass, unmodelled_body, constant_force, channel_delay, channel_gain,
         channel_offset,
     )

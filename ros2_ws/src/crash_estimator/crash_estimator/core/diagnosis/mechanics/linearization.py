@@ -139,6 +139,7 @@ def _linear_system(
     column, body, acts = (np.array(each) for each in zip(*actions.acting, strict=True))
     slopes = np.array([(f.kx, f.kv, f.kp) for f in forces], float).reshape(n, 3, g).transpose(1, 0, 2)
     kx, kv, kp = np.ascontiguousarray(slopes)  # as one link's are already: for two layouts all would be compiled twice
+    memories = [memory for f in forces for memory in f.memories]
     peaks = [f.loading & f.kp.any() for f in forces]  # none is kept that nothing hangs on
     knot, order, touched = ranked(np.array([f.knot for f in forces], np.int64).reshape(n, g, 2), layout.knots)
     changed = np.ones(g, bool)
@@ -162,8 +163,16 @@ def _linear_system(
         column=column,
         body=body,
         acts=acts,
+        remembers=np.array([k for k, f in enumerate(forces) for _ in f.memories], np.int64),
+        kept=_stacked([m.kept for m in memories], g),
+        by_crush=_stacked([m.by_crush for m in memories], g),
+        recalled=_stacked([m.force for m in memories], g),
         touched=touched,
     ), order
+
+
+def _stacked(rows: Sequence[np.ndarray], g: int) -> np.ndarray:
+    return np.array(rows, float).reshape(len(rows), g)
 
 
 def _acting(link: Link, theta: np.ndarray) -> Link:

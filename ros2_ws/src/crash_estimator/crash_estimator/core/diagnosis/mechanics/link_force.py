@@ -2,11 +2,13 @@
 
     S  = curve, constant or known stiffness at the crush X (less the gap); on an unloading line
          S(X_peak) - Ku (X_peak - X)
-    F  = S (1 + c h(V)) + gate (C V + sum of c_i f_i)
+    F  = S (1 + c h(V)) + gate (C V + sum of c_i f_i + sum of c_j z_j)
 
 `gate` is 1 where the link carries and 0 where it is apart; it turns within one time step, in proportion to the time
 carried, so that a force that jumps at contact gives the right momentum whatever the step. A link without tension whose
-damper never pulls carries nothing where F is negative though S is not.
+damper never pulls carries nothing where F is negative though S is not. What z remembers follows
+
+    dz_t = a_t dz_{t-1} + b_t (dX_t - dX_{t-1}),
 """
 
 from typing import NamedTuple
@@ -30,6 +32,14 @@ LOG_STEP = 1e-4
 """Of the logarithm of a shape constant: a central difference errs by its square."""
 
 
+class Memory(NamedTuple):
+    """How one remembering force follows a change of the motion, over g instants."""
+
+    kept: np.ndarray  # (g,) dz_t/dz_{t-1}
+    by_crush: np.ndarray  # (g,) dz_t/dX_t = - dz_t/dX_{t-1}, 1/m
+    force: np.ndarray  # (g,) N, dF_t/dz_t
+
+
 class LinkForce(NamedTuple):
     """g instants, m parameters."""
 
@@ -44,6 +54,7 @@ class LinkForce(NamedTuple):
     columns: list[np.ndarray]  # m of (g,), dF/dparameter
     apart: np.ndarray  # (g,) bool
     unloads: np.ndarray  # (g,) bool
+    memories: list[Memory]
 
 
 def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate: np.ndarray) -> LinkForce:
@@ -70,7 +81,8 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
         columns.append(at * carries * factor)
 
     damping = theta[link.damping] if link.damping is not None else link.known_damping
-    if damping or link.damping is not None or link.parallel:
+    memories: list[Memory] = []
+    if damping or link.damping is not None or link.parallel or link.remembering:
         parallel, px, pv = damping * rate, np.zeros_like(x), np.full_like(x, damping)
         if link.damping is not None:
             parameters.append(link.damping)
@@ -87,6 +99,10 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
             parallel, px, pv = parallel + c * f, px + c * fx, pv + c * fv
             parameters += term.shapes.values()
             columns += [gate * c * d for d in by_shape]
+        for term in link.remembering:
+            parallel, memory = _remembered(term, link, theta, x, gate, parallel, parameters, columns)
+            px = px + theta[term.coefficient] * memory.by_crush
+            memories.append(memory)
         force = force + gate * parallel
         kx, kv = kx + gate * px + found.gate_slope * parallel, kv + gate * pv
         if law.unloads:
@@ -106,7 +122,10 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
         apart |= ~acts
         force, kx, kv, kp, weight = force * acts, kx * acts, kv * acts, kp * acts, weight * acts[:, None]
         columns = [column * acts for column in columns]
-    return LinkForce(force, kx, kv, kp, found.loading, found.knot, weight, parameters, columns, apart, unloads)
+        memories = [memory._replace(force=memory.force * acts) for memory in memories]
+    return LinkForce(
+        force, kx, kv, kp, found.loading, found.knot, weight, parameters, columns, apart, unloads, memories
+    )
 
 
 def _law(link: Link, theta: np.ndarray) -> Law:
@@ -120,6 +139,18 @@ def _law(link: Link, theta: np.ndarray) -> Law:
     for term in link.in_law:
         law = term.addition.effect.changed_law(law, float(theta[term.coefficient]))
     return law
+
+
+def _remembered(term: Term, link: Link, theta, x, gate, parallel, parameters, columns) -> tuple[np.ndarray, Memory]:
+    """The parallel force with c z added, and its memory; derivatives are appended."""
+    c, effect, shapes = theta[term.coefficient], term.addition.effect, _shapes(term, theta)
+    crush = np.concatenate([[0.0], x if link.tension else np.maximum(x, 0.0)])
+    z, kept, by_crush = (each[1:] for each in effect.memory(crush, 0.0, **shapes))
+    parameters += [term.coefficient, *term.shapes.values()]
+    columns += [gate * z]
+    columns += [gate * c * d for d in _by_shapes(term, theta, lambda **s: effect.memory(crush, 0.0, **s)[0][1:])]
+    follows = by_crush if link.tension else np.where(x > 0.0, by_crush, 0.0)
+    return parallel + c * z, Memory(kept, follows, gate * c)
 
 
 def _shapes(term: Term, theta: np.ndarray, changed: str = "", by: float = 0.0) -> dict[str, float]:

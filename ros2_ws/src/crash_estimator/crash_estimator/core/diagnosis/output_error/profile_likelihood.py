@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from ...effects.effect import Addition
 from .continuation import SLOW_CONTACT, SMALL_STEPS
@@ -59,6 +58,8 @@ def profile(problem: OutputErrorProblem, addition: Addition, starts: Sequence[fl
 
 def closer(look: Profile) -> Fit:
     """The fit at the least of the profile, then with the coefficient free."""
+    from scipy.optimize import minimize_scalar  # long to import, and seldom needed
+
     best = look.fit
 
     def cost(logarithm: float) -> float:

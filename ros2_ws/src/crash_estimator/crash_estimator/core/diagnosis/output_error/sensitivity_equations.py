@@ -2,7 +2,7 @@
 
 A small change of the parameters moves the bodies by xi, which obeys the linear equations
 
-    M_k xi''_k = sum over links of -+ (kx xi_X + kv xi_V + kp xi_peak + dF/dtheta) + external,
+    M_k xi''_k = sum over links of -+ (kx xi_X + kv xi_V + kp xi_peak + sum of dF/dz xi_z + dF/dtheta) + external,
 
 along the trajectory about which the forces were linearised. Every column of the result is one parameter; column
 0 is driven by the defect, the amount by which the trajectory itself misses the equations of motion, so that a
@@ -33,10 +33,11 @@ def _whole(columns):
 def propagate(system, sampling, out):
     """Fill out (bins, q, columns); system: a `linear.Linear`, sampling: a `linear.Sampling`."""
     steps, ends, crush_ends, inverse_mass, kind, kx, kv, kp, loading, knot, weight = system[:11]
-    changed, observer, others, column, body, acts, touched = system[11:]
+    changed, observer, others, column, body, acts, remembers, kept, by_crush, recalled, touched = system[11:]
     b, links, columns = len(kind), len(ends), _whole(others + touched[-1])
     x, v, a = np.zeros((b, columns)), np.zeros((b, columns)), np.zeros((b, columns))
     peak, row = np.zeros((links, columns)), np.zeros((b, columns))
+    memory = np.zeros((len(remembers), columns))
     number = np.full(b, -1)
     free, measured = 0, False
     for k in range(b):
@@ -50,6 +51,13 @@ def propagate(system, sampling, out):
         dt = steps[t]
         half, sixth = dt / 2.0, dt * dt / 6.0
         active = _whole(others + touched[t])
+        for m in range(len(remembers)):  # before the bodies move: what is kept, less the crush that it starts from
+            near, far = crush_ends[remembers[m], 0], crush_ends[remembers[m], 1]
+            for j in range(active):
+                memory[m, j] *= kept[m, t]
+            if near >= 0:
+                for j in range(active):
+                    memory[m, j] -= by_crush[m, t] * (x[near, j] - x[far, j])
         for k in range(b):
             for j in range(active):
                 row[k, j] = 0.0
@@ -69,6 +77,7 @@ def propagate(system, sampling, out):
                     for j in range(active):
                         row[k, j] -= second * x[k, j] + first * v[k, j]
         _push(FREE, t, others, active, ends, crush_ends, inverse_mass, kind, kx, kv, kp, knot, weight, x, v, peak, row)
+        _recall(FREE, t, active, ends, inverse_mass, kind, remembers, recalled, memory, row)
         if changed[t]:
             _implicit(t, half, sixth, observer, ends, crush_ends, inverse_mass, kx, kv, number, matrix, inverse)
         for k in range(b):
@@ -100,6 +109,12 @@ def propagate(system, sampling, out):
                 FIXED, t, others, active, ends, crush_ends, inverse_mass, kind, kx, kv, kp, knot, weight,
                 x, v, peak, row,
             )  # fmt: skip
+            _recall(FIXED, t, active, ends, inverse_mass, kind, remembers, recalled, memory, row)
+        for m in range(len(remembers)):
+            near, far = crush_ends[remembers[m], 0], crush_ends[remembers[m], 1]
+            if near >= 0:
+                for j in range(active):
+                    memory[m, j] += by_crush[m, t] * (x[near, j] - x[far, j])
         _sample(sampling, t, active, row, out)
 
 
@@ -130,6 +145,18 @@ def _push(onto, t, others, active, ends, crush_ends, inverse_mass, kind, kxs, kv
                     row[k, others + knot[link, t, end]] += share * weight[link, t, end]
 
 
+@njit(cache=True, fastmath=True, error_model="numpy", inline="always")
+def _recall(onto, t, active, ends, inverse_mass, kind, remembers, recalled, memory, row):
+    """Add what the remembered part of the links' forces changes by, but for this step's own crush, which is in kx."""
+    for m in range(len(remembers)):
+        for side in range(2):
+            k = ends[remembers[m], side]
+            if kind[k] == onto:
+                scale = recalled[m, t] * (inverse_mass[k] if side else -inverse_mass[k])
+                for j in range(active):
+                    row[k, j] += scale * memory[m, j]
+
+
 @njit(cache=True, error_model="numpy")
 def respond(system, change):
     """What propagate's columns add up to, each times its change (columns,), as the bodies' accelerations (g, b).
@@ -137,9 +164,10 @@ def respond(system, change):
     One column needs no loops over columns, and so a fourth of the time.
     """
     steps, ends, crush_ends, inverse_mass, kind, kx, kv, kp, loading, knot, weight = system[:11]
-    changed, observer, others, column, body, acts = system[11:17]
+    changed, observer, others, column, body, acts, remembers, kept, by_crush, recalled = system[11:21]
     b, links = len(kind), len(ends)
     x, v, a, row, peak = np.zeros(b), np.zeros(b), np.zeros(b), np.zeros(b), np.zeros(links)
+    memory = np.zeros(len(remembers))
     number, free = np.full(b, -1), 0
     for k in range(b):
         if kind[k] == FREE:
@@ -156,6 +184,9 @@ def respond(system, change):
     for t in range(len(steps)):
         dt = steps[t]
         half, sixth = dt / 2.0, dt * dt / 6.0
+        for m in range(len(remembers)):
+            near, far = crush_ends[remembers[m], 0], crush_ends[remembers[m], 1]
+            memory[m] = kept[m, t] * memory[m] - (by_crush[m, t] * (x[near] - x[far]) if near >= 0 else 0.0)
         for k in range(b):
             row[k] = rows[t, k]
             if kind[k] == DRIVEN:
@@ -176,6 +207,10 @@ def respond(system, change):
                     force += weight[link, t, end] * change[others + knot[link, t, end]]
             row[ends[link, 0]] -= inverse_mass[ends[link, 0]] * force
             row[ends[link, 1]] += inverse_mass[ends[link, 1]] * force
+        for m in range(len(remembers)):
+            force = recalled[m, t] * memory[m]
+            row[ends[remembers[m], 0]] -= inverse_mass[ends[remembers[m], 0]] * force
+            row[ends[remembers[m], 1]] += inverse_mass[ends[remembers[m], 1]] * force
         if changed[t]:
             _implicit(t, half, sixth, observer, ends, crush_ends, inverse_mass, kx, kv, number, matrix, inverse)
         for k in range(b):
@@ -193,6 +228,10 @@ def respond(system, change):
             near, far = crush_ends[link, 0], crush_ends[link, 1]
             if loading[link, t] and near >= 0:
                 peak[link] = x[near] - x[far]
+        for m in range(len(remembers)):
+            near, far = crush_ends[remembers[m], 0], crush_ends[remembers[m], 1]
+            if near >= 0:
+                memory[m] += by_crush[m, t] * (x[near] - x[far])
     return found
 
 

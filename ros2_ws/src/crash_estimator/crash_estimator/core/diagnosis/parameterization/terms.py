@@ -42,6 +42,11 @@ class Link:
         return tuple(term for term in self.terms if term.addition.effect.in_parallel)
 
     @cached_property
+    def remembering(self) -> tuple[Term, ...]:
+        """Forces beside the spring that hang on the way its crush has gone."""
+        return tuple(term for term in self.terms if term.addition.effect.remembers)
+
+    @cached_property
     def factors(self) -> tuple[Term, ...]:
         """Factors on the spring's force."""
         return tuple(term for term in self.terms if term.addition.effect.scales_static)

@@ -85,4 +85,4 @@ def _with_more_care(problem: OutputErrorProblem, found: Fit, residuals: Residual
 def forces_jump(layout: Layout) -> bool:
     """Whether some force ends at separation other than by falling to zero."""
     one_way = [link for link in layout.links if not link.tension]
-    return any(link.parallel or link.damping is not None or link.known_damping for link in one_way)
+    return any(link.parallel or link.remembering or link.damping is not None or link.known_damping for link in one_way)

@@ -28,8 +28,8 @@ class BodyForce(Effect):
     def possible_targets(self, structure, test):
         return [body.name for body in structure.bodies if body.free]
 
-    def trial_argument(self, motion):
-        return motion.time
+    def trial(self, motion, **shapes):
+        return self.force(motion.time, **shapes)
 
     def put_to_work(self, structure, test, spec):
         k = structure.body_index[spec.target]

@@ -32,8 +32,8 @@ class StaticFactor(Effect):
     def stated_limits(self):
         return 0.0, np.inf
 
-    def trial_argument(self, motion):
-        return motion.rate
+    def trial(self, motion, **shapes):
+        return self.factor(motion.rate, **shapes)
 
     def put_to_work(self, structure, test, spec):
         """Known: a property of the element. Estimated: c of 1 + c h(V), in which the force is linear."""

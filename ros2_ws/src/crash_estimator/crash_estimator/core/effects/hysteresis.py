@@ -1,0 +1,30 @@
+"""Rate-independent hysteresis (Bouc 1967, Wen 1976): F = c z, a force that yields, and springs back when the motion turns.
+
+    dz/dX = (1 - |z|^n (1 + sgn(z dX)) / 2) / X_y,      z from -1 to 1, 0 at first contact
+
+X is the crush in m, compression positive; c in N, never negative: the force at which it yields. The crush X_y over
+which it would come there, and how sharply (n = 1 gradual, 10 as a spring behind a dry slider), are found. Joints, foams
+and slipping contacts do so; `coulomb_friction` is its limit for a small X_y, but turns with the rate at any speed.
+"""
+
+import numpy as np
+
+from .base import HystereticForce, Shape
+
+
+def memory(crush: np.ndarray, start: float, yield_crush: float, exponent: float):
+    """z (g,) from `start` at the first of the crushes (g,) m, and its derivatives by the z before and by the crush."""
+    from .bouc_wen import trace  # the compiler takes long to import: only who needs it waits for it
+
+    return trace(np.ascontiguousarray(crush, dtype=float), float(start), float(yield_crush), float(exponent))
+
+
+EFFECT = HystereticForce(
+    "hysteresis",
+    "N",
+    {
+        "yield_crush": Shape("m", 0.01, 0.6, (0.05, 0.2), of_crush=True),
+        "exponent": Shape("", 1.0, 10.0, (2.0,)),
+    },
+    memory=memory,
+)

@@ -1,0 +1,39 @@
+"""A force in parallel to an element's own that hangs on the way its crush has gone."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+
+from ...structure import CONTACT_FREQUENCY, TYPICAL_CRUSH
+from ..effect import Effect
+from ..estimator_model import ROUGHLY, coefficient_of, element_index, with_action
+from .element_force import HALF, on_element
+
+
+@dataclass(frozen=True)
+class HystereticForce(Effect):
+    """A force c z in parallel to an element's own, compression positive; z, within -1 and 1, is its memory.
+
+    memory(crush (g,) m, start, **shape constants) -> z (g,) from `start` at the first crush on, dz_t/dz_{t-1} (g,) and
+    dz_t/dX_t = - dz_t/dX_{t-1} (g,) 1/m. While the element is apart its crush counts as 0: the memory stays.
+    """
+
+    memory: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
+
+    remembers: ClassVar[bool] = True
+
+    def put_to_work(self, structure, test, spec):
+        k = element_index(structure, spec.target)
+        scale = ROUGHLY * structure.reduced_mass(k) * CONTACT_FREQUENCY**2 * TYPICAL_CRUSH
+        memory = partial(self.memory, **spec.shape)
+        return with_action(structure, spec, self.unit, "memory", k, coefficient_of(spec, self), scale, force=memory)
+
+    def candidates(self, structure, magnitudes):
+        for element in magnitudes.crushed_elements():
+            yield from on_element(self, magnitudes, element.name)
+
+    def prior_std(self, magnitudes, addition):
+        return HALF * magnitudes.force[magnitudes.element(addition.target)]
