@@ -8,6 +8,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from crash_replay.fault import Fault
+from crash_replay.starting import begin, held
 
 from .case import Case
 from .judge import COMPLETE, Content
@@ -61,7 +62,9 @@ def commit() -> str:
 
 
 def _in_processes(cases, out: Path, found: Mapping, jobs: int) -> Iterator[dict]:
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:
-        tasks = [pool.submit(run_case, case, out, found[case.undisturbed.name]) for case in cases]
+    spawn = get_context("spawn")
+    with ProcessPoolExecutor(jobs, mp_context=spawn, max_tasks_per_child=1, initializer=begin) as pool:
+        with held():
+            tasks = [pool.submit(run_case, case, out, found[case.undisturbed.name]) for case in cases]
         for task in as_completed(tasks):
             yield task.result()

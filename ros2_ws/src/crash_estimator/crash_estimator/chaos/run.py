@@ -3,6 +3,7 @@
 import os
 import shutil
 import signal
+import sys
 import time
 from pathlib import Path
 
@@ -23,6 +24,7 @@ TRIES = 3
 """Of a case, where others on this machine have come into its ROS domain."""
 BURNING = 8
 """Processes beside a busy run."""
+BURNER = [sys.executable, "-c", "from crash_replay.starting import begin; begin()\nwhile True: pass"]
 ENDING = 60.0
 """s for a process that is told to end."""
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -68,7 +70,7 @@ class Run:
             if ONE_CORE in self.conditions:
                 os.sched_setaffinity(0, {min(cores)})  # what is started inherits it
             for k in range((ONE_CORE in self.conditions) + BURNING * (BUSY in self.conditions)):
-                self._start(f"burner {k}", ["sh", "-c", "while :; do :; done"])
+                self._start(f"burner {k}", BURNER)
             self.use = USES[self.case.use](self.case, self.bag, self.folder, self._start, self.observer)
             endless = self._follow()
             ended = self._end()

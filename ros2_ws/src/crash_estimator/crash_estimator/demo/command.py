@@ -40,8 +40,12 @@ END_OF_REPLAY = 150.0
 
 
 def main() -> int:
+    return guarded(_main)
+
+
+def _main() -> int:
     interrupt_on_signals()  # what was started is ended
-    return guarded(lambda: demo(_parser().parse_args()))
+    return demo(_parser().parse_args())
 
 
 def _parser() -> Parser:
