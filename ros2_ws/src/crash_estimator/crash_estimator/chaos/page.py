@@ -19,9 +19,11 @@ does not end.
 
 The uses: `estimators`, a replay, two estimators and `record` in terminals of their own; `terminals`, these and
 the diagnosis; `shown`, the estimators and the viewer; `demo`, the demonstration without its viewer;
-`demo_shown`, with it. What the viewer writes is judged by its exit status alone. Nothing here starts
-`live.launch.py`: launch is not among the wheels, its tests run it against stand-ins. A full disk is a limit on
-the size of what a process writes, from that moment on.
+`demo_shown`, with it; `launch`, what `live.launch.py` describes, with diagnosis and `record`. What the viewer
+writes is judged by its exit status alone. launch is not among the wheels: a stand-in of ours starts the
+processes of the launch file, calls its handlers when one ends, and ends the others as launch does; `launch`
+itself is only stopped, never killed. A full disk is a limit on the size of what a process writes, from that
+moment on.
 
 A case's name is all that decides it: use, recording, and each fault as `kind:member@moment:duration`, the
 moment in s since the member's start, in % of the samples sent, or in s after the last sample. `make chaos

@@ -14,7 +14,7 @@ from .judge import Content, Ended, Outcome, Verdict, judged
 from .members import Member, children_of, command_line, send
 from .observer import Observer
 from .recordings import bag_of
-from .uses import DEMO, DIAGNOSIS, USES, Broken, estimators_of
+from .uses import DIAGNOSIS, STARTER, USES, Broken, estimators_of
 
 LIMIT = 180.0
 """s that a run may take, beside the time for which its faults last."""
@@ -28,7 +28,7 @@ BURNER = [sys.executable, "-c", "from crash_replay.starting import begin; begin(
 ENDING = 60.0
 """s for a process that is told to end."""
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-STARTED_BY_DEMO = ("demo", "replay", "diagnosis", "viewer")
+STARTED_BY_ONE = ("demo", "replay", "diagnosis", "viewer", "record")
 """Names of nodes, beside the estimators'."""
 MARKS = {
     "worker": "diagnosis_worker",  # the diagnosis's process that computes
@@ -36,6 +36,7 @@ MARKS = {
     "estimator": "/crash_estimator/estimator ",
     "diagnosis": "/crash_estimator/diagnosis ",
     "viewer": "/crash_estimator/viewer ",
+    "record": "/crash_replay/record ",
 }
 """In the command lines of processes that we have not started ourselves."""
 
@@ -117,14 +118,16 @@ class Run:
             member.process.wait()
 
     def _had_all(self, name: str) -> bool:
-        """Whether nobody but itself can know how it ended; the demonstration has nobody beside it."""
+        """Whether nobody but itself can know how it ended; who starts the others has nobody beside it."""
         word = self.observer.words.word(f"/{name}")
-        return name == DEMO or (word is not None and word.total > 0 and word.next >= word.total and not word.missing)
+        return name in STARTER.values() or (
+            word is not None and word.total > 0 and word.next >= word.total and not word.missing
+        )
 
     @property
     def strangers(self) -> list[str]:
         """Nodes that take part and are not of the run: somebody else came upon the same ROS domain."""
-        own = {*self.tops, *self.estimators, *STARTED_BY_DEMO} if DEMO in self.tops else {*self.tops}
+        own = {*self.tops, *self.estimators, *(STARTED_BY_ONE if self.case.use in STARTER else ())}
         return sorted(set(self.observer.words.names()) - {f"/{name}" for name in own})
 
     def _start(self, name: str, command: list[str]) -> Member:
@@ -141,13 +144,16 @@ class Run:
         member = self.tops.get(name)
         if member:
             return member.process.pid if member.status is None else 0
-        starter = self.tops[DIAGNOSIS if DIAGNOSIS in self.tops else DEMO]
+        starter = self._starter()
         mark = MARKS[name]
         return next((child for child in children_of(starter.process.pid) if mark in command_line(child)), 0)
 
     def since_start(self, name: str) -> float:
-        starter = self.tops.get(name) or self.tops[DIAGNOSIS if DIAGNOSIS in self.tops else DEMO]
-        return time.monotonic() - starter.started_at
+        return time.monotonic() - (self.tops.get(name) or self._starter()).started_at
+
+    def _starter(self) -> Member:
+        """Of those that we have not started ourselves."""
+        return self.tops[STARTER.get(self.case.use, DIAGNOSIS)]
 
     @property
     def played(self) -> float:
