@@ -1,7 +1,6 @@
 """Runs side by side, each judged by a process of its own, and a file of what came of them."""
 
 import json
-import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
@@ -40,9 +39,8 @@ def rows(
     cases: Sequence[Case], results: Path, found: Mapping[str, dict[str, Content]], jobs: int, seed: int
 ) -> Iterator[dict]:
     """In the order in which they are done; each is added to the file of results."""
-    code = commit()
     for row in _in_processes(cases, results.parent, found, jobs):
-        row |= {"seed": seed, "code": code}
+        row |= {"seed": seed}
         with results.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
         yield row
@@ -50,15 +48,6 @@ def rows(
 
 def kept(results: Path) -> list[dict]:
     return [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()]
-
-
-def commit() -> str:
-    """Of the code that runs, in short."""
-    asked = ["git", "-C", str(Path(__file__).resolve().parent), "rev-parse", "--short", "HEAD"]
-    try:
-        return subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
-    except (OSError, subprocess.CalledProcessError):
-        return "unknown"
 
 
 def _in_processes(cases, out: Path, found: Mapping, jobs: int) -> Iterator[dict]:

@@ -3,6 +3,7 @@
 import os
 import shutil
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -164,9 +165,18 @@ class Run:
         return time.monotonic() - self.finished_at if self.finished_at else -1.0
 
 
+def commit() -> str:
+    """Of the code that runs, in short."""
+    asked = ["git", "-C", str(Path(__file__).resolve().parent), "rev-parse", "--short", "HEAD"]
+    try:
+        return subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
 def run_case(case: Case, out: Path, reference: dict[str, Content] | None) -> dict:
     """Its row of results; without a reference it is to become one itself."""
-    began = time.monotonic()
+    began, code = time.monotonic(), commit()
     folder = out / "logs" / case.name.replace("/", "__").replace(":", ".")
     for _ in range(TRIES):
         run = Run(case, folder, out / "recordings")
@@ -181,6 +191,7 @@ def run_case(case: Case, out: Path, reference: dict[str, Content] | None) -> dic
         verdict = judged(outcome, reference or contents)
     return {
         "case": case.name,
+        "code": code,
         "verdict": verdict.verdict,
         "why": verdict.why,
         "seconds": round(time.monotonic() - began, 1),
