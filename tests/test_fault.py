@@ -101,6 +101,22 @@ def test_a_signal_leaves_nothing_half_written(number, tmp_path, capsys):
     assert capsys.readouterr().err == ""
 
 
+def test_a_signal_whose_exception_is_lost_comes_again(capsys):
+    """Python cannot let it rise from here, as from a callback of numba's while that compiles."""
+
+    class Lost:
+        def __del__(self):
+            signal.raise_signal(signal.SIGTERM)
+            time.sleep(0.0)
+
+    def command():
+        Lost()
+        time.sleep(5.0)
+
+    assert guarded(command) == 128 + signal.SIGTERM
+    assert capsys.readouterr().err == ""
+
+
 OF_A_BAG = ["impactor_single.mcap", "--model", "impactor_single"]
 COMMANDS = [
     (estimate, "load_model", OF_A_BAG),
