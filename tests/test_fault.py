@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from threading import Thread
 
@@ -134,7 +135,7 @@ def test_every_command_ends_with_a_line(command, step, arguments, monkeypatch, c
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(command, step, lambda *_, **__: raising(RuntimeError("broken"))())
     if command is demo:
-        monkeypatch.setattr(demo, "interrupt_on_signals", lambda: None)
+        monkeypatch.setattr(demo, "interrupted_by_signals", nullcontext)
     monkeypatch.setattr(sys, "argv", ["command", *arguments])
     try:
         status = command.main()

@@ -74,7 +74,10 @@ def guarded(command: Callable[[], int | None], also: tuple[type[Exception], ...]
 
 @contextmanager
 def _signals_end_it() -> Iterator[None]:
-    """Like Ctrl-C, unless they are dealt with already: a file that is half written would stay."""
+    """Like Ctrl-C, unless they are dealt with already: a file that is half written would stay.
+
+    Who deals with them himself, as a node does, still does so afterwards: no signal changes how it has ended.
+    """
     ours = threading.current_thread() is threading.main_thread()
     free = [number for number in ENDING if ours and signal.getsignal(number) in (signal.SIG_DFL, leave)]
 
@@ -87,7 +90,8 @@ def _signals_end_it() -> Iterator[None]:
         yield
     finally:
         for number in free:
-            signal.signal(number, signal.SIG_DFL)
+            if signal.getsignal(number) is end:
+                signal.signal(number, signal.SIG_DFL)
 
 
 @contextmanager

@@ -30,7 +30,7 @@ from .choice import (
 )
 from .domain import own_environment
 from .folder import claim
-from .interrupts import interrupt_on_signals
+from .interrupts import interrupted_by_signals
 from .terminal import Terminal, near
 
 START_OF_REPLAY = 3600.0
@@ -44,8 +44,8 @@ def main() -> int:
 
 
 def _main() -> int:
-    interrupt_on_signals()  # what was started is ended
-    return demo(_parser().parse_args())
+    with interrupted_by_signals():  # what was started is ended
+        return demo(_parser().parse_args())
 
 
 def _parser() -> Parser:
