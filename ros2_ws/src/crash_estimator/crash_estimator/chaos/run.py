@@ -17,8 +17,8 @@ from .observer import Observer
 from .recordings import bag_of
 from .uses import DIAGNOSIS, STARTER, USES, Broken, estimators_of
 
-LIMIT = 180.0
-"""s that a run may take, beside the time for which its faults last."""
+LIMIT = 480.0
+"""s that a run may take, beside the time for which its faults last: more than the programs say that they wait."""
 COMPILING = 1020.0
 """s more where nothing is compiled yet."""
 TRIES = 3
