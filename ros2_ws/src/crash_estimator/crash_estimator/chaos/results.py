@@ -6,13 +6,13 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
 
-from crash_replay.fault import Fault
+from crash_replay.fault import Fault, one_line
 from crash_replay.starting import begin, held
 
 from .case import Case
-from .judge import COMPLETE, Content
+from .judge import COMPLETE, FAILED, Content
 from .recordings import bag_of
-from .run import run_case
+from .run import commit, run_case
 
 RESULTS = "results.jsonl"
 """In the folder of a run's logs: a row of JSON for each case."""
@@ -54,6 +54,18 @@ def _in_processes(cases, out: Path, found: Mapping, jobs: int) -> Iterator[dict]
     spawn = get_context("spawn")
     with ProcessPoolExecutor(jobs, mp_context=spawn, max_tasks_per_child=1, initializer=begin) as pool:
         with held():
-            tasks = [pool.submit(run_case, case, out, found[case.undisturbed.name]) for case in cases]
+            tasks = {pool.submit(run_case, case, out, found[case.undisturbed.name]): case for case in cases}
         for task in as_completed(tasks):
-            yield task.result()
+            error = task.exception()
+            yield not_judged(tasks[task], error) if error else task.result()
+
+
+def not_judged(case: Case, error: BaseException) -> dict:
+    """The row of a case whose judge has failed: the others are judged all the same."""
+    why = f"the judge failed: {one_line(repr(error))}"
+    nothing = {"carried out": [], "not carried out": [], "statuses": {}, "contradictions": {}, "strangers": []}
+    return (
+        {"case": case.name, "code": commit(), "verdict": FAILED, "why": why, "seconds": 0.0}
+        | nothing
+        | {"contents": {}}
+    )
