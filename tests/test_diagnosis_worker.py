@@ -52,6 +52,19 @@ def test_a_process_answers_with_the_users_effects_and_is_replaced_where_it_ends(
         worker.close()
 
 
+def test_a_process_that_is_killed_while_it_has_nothing_to_do_is_replaced(damped):
+    _, model, recording = damped
+    worker = Worker(model)
+    try:
+        assert _reply(worker, ready=True) is None
+        worker.process.kill()
+        worker.process.wait()
+        worker.ask(Task(model, so_far(recording, 0.03), final=False))
+        assert _reply(worker).answer is not None
+    finally:
+        worker.close()
+
+
 def test_a_process_that_ends_again_and_again_is_given_up(damped):
     worker = Worker(damped[1])
     try:

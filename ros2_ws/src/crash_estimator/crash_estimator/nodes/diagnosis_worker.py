@@ -99,7 +99,7 @@ class Worker:
     def ask(self, task: Task) -> None:
         """Only while it is not busy: then it takes the task from the pipe as fast as it is put there."""
         self.busy, self.wanted, self.long, self.task = True, True, task.final, task
-        self._pipe.send(task)
+        self._send(task)
 
     def reply(self) -> Reply | None:
         """What has come for the last task since the last look. Raises WorkerError."""
@@ -128,6 +128,10 @@ class Worker:
         self.process.wait()
         self._pipe.close()
 
+    def _send(self, content) -> None:
+        with suppress(ConnectionError):  # killed while it had nothing to do: the next look finds it gone
+            self._pipe.send(content)
+
     def _ended(self) -> Reply | None:
         """The process is gone: another one is asked the same. Raises WorkerError where that has happened too often."""
         status = self.process.wait()
@@ -147,7 +151,7 @@ class Worker:
         with held(signal.SIGINT, signal.SIGHUP):  # for good: they are for the node, which ends this
             self.process = subprocess.Popen(command, pass_fds=[its.fileno()], stdin=subprocess.DEVNULL)
         its.close()
-        self._pipe.send(self.setup)
+        self._send(self.setup)
         self.busy, self.wanted, self.long = True, False, False  # until it says that it is there
 
 
