@@ -31,11 +31,10 @@ def reference(out):
     [
         (STOPPED, COMPLETE, {"kalman": 0, "rls": 0, "record": 0, "replay": 0}),
         (KILLED, SAID, {"kalman": 0, "rls": -9, "record": 1, "replay": 1}),
-        # who leaves by its own will, though with less than all, is not the replay's to name: it says so itself
-        (HUNG_UP, SAID, {"kalman": 1, "rls": 0, "record": 1, "replay": 0}),
+        (HUNG_UP, SAID, {"kalman": 1, "rls": 0, "record": 1, "replay": 1}),
         (WITHOUT_REPLAY, SAID, {"kalman": 1, "rls": 1, "record": 1, "replay": -9}),
         (WITHOUT_RECORD, SAID, {"kalman": 0, "rls": 0, "record": -9, "replay": 1}),
-        (FULL_DISK, SAID, {"kalman": 0, "rls": 0, "record": 1, "replay": 0}),
+        (FULL_DISK, SAID, {"kalman": 0, "rls": 0, "record": 1, "replay": 1}),
     ],
 )
 def test_run(name, verdict, statuses, out, reference):

@@ -5,6 +5,7 @@ import pytest
 from crash_estimator.chaos.case import EXAMPLE, Case, Fault, case_of
 from crash_estimator.chaos.judge import COMPLETE, FAILED, SAID, Ended, Outcome, Product, judged
 from crash_estimator.chaos.plan import plan
+from crash_estimator.chaos.results import RESULTS, kept, rows
 from crash_replay.recording import RecordingError
 
 REFERENCE = {"estimates": {"0": "a", "1": "b", "2": "c"}}
@@ -96,3 +97,13 @@ def test_the_example():
 def test_who_does_not_write_has_no_full_disk():
     full = {fault.member for case in plan(1, 500) for fault in case.faults if fault.kind == "full_disk"}
     assert full == {"record", "viewer", "demo"}
+
+
+def test_a_judge_that_fails_costs_its_own_case_alone(tmp_path):
+    """No such recording: what rises in its process is a row, and the next case is still done."""
+    cases = [case_of(f"demo/{name}/undisturbed") for name in ("nowhere", "elsewhere")]
+    (tmp_path / RESULTS).touch()
+    found = {case.name: {} for case in cases}
+    done = list(rows(cases, tmp_path / RESULTS, found, jobs=1, seed=1))
+    assert [row["verdict"] for row in done] == [FAILED, FAILED] and kept(tmp_path / RESULTS) == done
+    assert all(row["why"].startswith("the judge failed: KeyError(") for row in done)

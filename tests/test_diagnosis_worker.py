@@ -1,7 +1,11 @@
 """The diagnosis in a process of its own: it answers, is replaced where it ends, and lives on where an effect fails."""
 
+import struct
+import subprocess
+import sys
 import time
 from dataclasses import replace
+from multiprocessing.connection import Connection, Pipe
 
 import pytest
 from helpers_diagnosis import hidden_case, so_far
@@ -48,6 +52,19 @@ def test_a_process_answers_with_the_users_effects_and_is_replaced_where_it_ends(
         worker.close()
 
 
+def test_a_process_that_is_killed_while_it_has_nothing_to_do_is_replaced(damped):
+    _, model, recording = damped
+    worker = Worker(model)
+    try:
+        assert _reply(worker, ready=True) is None
+        worker.process.kill()
+        worker.process.wait()
+        worker.ask(Task(model, so_far(recording, 0.03), final=False))
+        assert _reply(worker).answer is not None
+    finally:
+        worker.close()
+
+
 def test_a_process_that_ends_again_and_again_is_given_up(damped):
     worker = Worker(damped[1])
     try:
@@ -84,3 +101,27 @@ def _reply(worker: Worker, ready: bool = False):
             return reply
         time.sleep(0.01)
     raise AssertionError("waited 60 s in vain for the process")
+
+
+def nothing(node: Connection, setup) -> None:
+    pass
+
+
+def half_a_message(node: Connection, setup) -> None:
+    with open(node.fileno(), "wb", closefd=False) as pipe:
+        pipe.write(struct.pack("!i", 1000) + b"its beginning")
+
+
+def the_first(node: Connection, setup) -> None:
+    node.send(setup)
+
+
+@pytest.mark.parametrize("says", [nothing, half_a_message, the_first])
+def test_a_node_that_is_killed_leaves_no_traceback(says, damped):
+    node, its = Pipe()
+    command = f"from crash_estimator.nodes.diagnosis_worker import main; main({its.fileno()})"
+    process = subprocess.Popen([sys.executable, "-c", command], pass_fds=[its.fileno()], stderr=subprocess.PIPE)
+    its.close()
+    says(node, (damped[1], "", ()))
+    node.close()
+    assert process.communicate(timeout=60.0) == (None, b"") and process.returncode == 0

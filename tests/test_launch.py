@@ -1,142 +1,49 @@
 """The launch file against stand-ins for launch and launch_ros, which do not come as wheels."""
 
-import runpy
+import os
+import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
-from typing import get_origin
+from types import SimpleNamespace
 
 import pytest
-from ruamel.yaml import YAML
 
+from crash_estimator.chaos.launch_words import (
+    DeclareLaunchArgument,
+    LaunchContext,
+    Node,
+    RegisterEventHandler,
+    arguments_of,
+    described,
+    started,
+)
 from crash_estimator.core.methods import METHODS
+from crash_estimator.demo.domain import free_domain
 from crash_replay.replay_parameters import PARAMETERS
 
 PACKAGES = Path(__file__).resolve().parent.parent / "ros2_ws/src"
+BAG = PACKAGES.parents[1] / "bags/impactor_single.mcap"
 LAUNCH_FILE = PACKAGES / "crash_estimator/launch/live.launch.py"
 
 
-class LaunchConfiguration:
-    def __init__(self, name):
-        self.name = name
-
-    def value(self, given):
-        return given[self.name]
-
-
-class PythonExpression:
-    def __init__(self, parts):
-        self.parts = parts
-
-    def value(self, given):
-        return str(eval("".join(part if isinstance(part, str) else part.value(given) for part in self.parts)))
-
-
-class LaunchContext:
-    def __init__(self, given, is_shutdown=False):
-        self.launch_configurations, self.is_shutdown = given, is_shutdown
-
-
-class OnProcessExit:
-    def __init__(self, *, target_action, on_exit):
-        self.target_action, self.on_exit = target_action, on_exit
-
-
-class RegisterEventHandler:
-    def __init__(self, event_handler):
-        self.event_handler = event_handler
-
-
-class Shutdown:
-    def __init__(self, *, reason):
-        self.reason = reason
-
-
-class EmitEvent:
-    def __init__(self, *, event):
-        self.event = event
-
-
-class ParameterValue:
-    def __init__(self, value, *, value_type):
-        self.of, self.value_type = value, value_type
-
-    def value(self, given):
-        value = self.of.value(given)
-        if get_origin(self.value_type) is list:
-            value = YAML(typ="safe").load(value)
-            assert isinstance(value, list) and all(isinstance(one, str) for one in value)
-            return value
-        return value.lower() == "true" if self.value_type is bool else self.value_type(value)
-
-
-class IfCondition:
-    def __init__(self, predicate):
-        self.predicate = predicate
-
-    def holds(self, given):
-        return {"true": True, "1": True, "false": False, "0": False}[self.predicate.value(given).lower()]
-
-
-class DeclareLaunchArgument:
-    def __init__(self, name, *, default_value=None, description=None):
-        self.name, self.default_value, self.description = name, default_value, description
-
-
-class Node:
-    def __init__(self, *, package, executable, output=None, parameters=(), condition=None):
-        self.package, self.executable, self.parameters, self.condition = package, executable, parameters, condition
-
-    def values(self, given):
-        return {
-            name: value.value(given) if hasattr(value, "value") else value
-            for parameters in self.parameters
-            for name, value in parameters.items()
-        }
-
-
-def stand_in(monkeypatch, name, **contents):
-    module = ModuleType(name)
-    vars(module).update(contents)
-    monkeypatch.setitem(sys.modules, name, module)
-
-
 @pytest.fixture
-def entities(monkeypatch):
+def entities():
     """What the launch file describes."""
-    stand_in(monkeypatch, "launch", LaunchDescription=list, LaunchContext=LaunchContext)
-    actions = {one.__name__: one for one in (DeclareLaunchArgument, EmitEvent, RegisterEventHandler)}
-    stand_in(monkeypatch, "launch.actions", **actions)
-    stand_in(monkeypatch, "launch.conditions", IfCondition=IfCondition)
-    stand_in(monkeypatch, "launch.event_handlers", OnProcessExit=OnProcessExit)
-    stand_in(monkeypatch, "launch.events", Shutdown=Shutdown)
-    stand_in(monkeypatch, "launch.events.process", ProcessExited=SimpleNamespace)
-    stand_in(
-        monkeypatch, "launch.substitutions", LaunchConfiguration=LaunchConfiguration, PythonExpression=PythonExpression
-    )
-    stand_in(monkeypatch, "launch_ros")
-    stand_in(monkeypatch, "launch_ros.actions", Node=Node)
-    stand_in(monkeypatch, "launch_ros.parameter_descriptions", ParameterValue=ParameterValue)
-    return runpy.run_path(str(LAUNCH_FILE))["generate_launch_description"]()
+    return described(LAUNCH_FILE)
 
 
 @pytest.fixture
 def launched(entities):
     """Launch with arguments name=text -> the nodes that are started, by executable."""
-    arguments = [entity for entity in entities if isinstance(entity, DeclareLaunchArgument)]
-    assert all(argument.description for argument in arguments)
+    assert all(entity.description for entity in entities if isinstance(entity, DeclareLaunchArgument))
+    defaults = arguments_of(entities)
+    assert {name for name, value in defaults.items() if value is None} == {"bag", "model"}
 
     def launch(**given):
-        defaults = {
-            argument.name: argument.default_value for argument in arguments if argument.default_value is not None
-        }
-        needed = {argument.name for argument in arguments} - defaults.keys()
-        assert needed == {"bag", "model"}
         values = defaults | given
-        nodes = [entity for entity in entities if isinstance(entity, Node)]
-        started = [node for node in nodes if node.condition is None or node.condition.holds(values)]
-        return {node.executable: SimpleNamespace(package=node.package, **node.values(values)) for node in started}
+        nodes = started(entities, values)
+        return {node.executable: SimpleNamespace(package=node.package, **node.values(values)) for node in nodes}
 
     return launch
 
@@ -184,7 +91,7 @@ def ends(entities):
         for one in entities
         if isinstance(one, RegisterEventHandler)
     }
-    defaults = {one.name: one.default_value for one in entities if isinstance(one, DeclareLaunchArgument)}
+    defaults = arguments_of(entities)
 
     def end(name, status, is_shutdown=False, **given):
         context = LaunchContext(defaults | {"bag": "b", "model": "m"} | given, is_shutdown)
@@ -240,3 +147,25 @@ def test_the_executables_and_the_launch_file_are_installed(launched):
     for name, node in nodes.items():
         assert f'"{name} = {node.package}.' in (PACKAGES / node.package / "setup.py").read_text()
     assert 'glob("launch/*.launch.py")' in (PACKAGES / "crash_estimator/setup.py").read_text()
+
+
+def carried_out(folder, **given):
+    """The launch with its processes -> status and what they said."""
+    command = [sys.executable, "-m", "crash_estimator.chaos.launching", *(f"{k}:={v}" for k, v in given.items())]
+    environment = os.environ | {"ROS_DOMAIN_ID": str(free_domain()), "PYTHONUNBUFFERED": "1"}
+    ends = {"capture_output": True, "text": True, "timeout": 120.0}
+    done = subprocess.run(command, cwd=folder, env=environment, **ends)
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_carried_out_it_ends_by_itself(tmp_path):
+    asked = {"viewer": "false", "exit_when_finished": "true", "rate": "0.5", "record": tmp_path / "e.mcap"}
+    status, said = carried_out(tmp_path, bag=BAG, model="impactor_single", **asked)
+    assert status == 0 and "e.mcap: " in said and ", complete" in said, said
+    assert "shutdown: all is replayed, shown and recorded" in said and "Traceback" not in said
+
+
+def test_carried_out_it_ends_with_who_fails(tmp_path):
+    status, said = carried_out(tmp_path, bag=BAG, model="impactor_singel", viewer="false")
+    assert status == 1 and "estimator has ended with exit status 1; what it said stands above" in said, said
+    assert "did you mean 'impactor_single'?" in said and "Traceback" not in said

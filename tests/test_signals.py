@@ -9,7 +9,7 @@ import pytest
 from helpers_domain import own_domain
 from rclpy.node import Node
 
-from crash_estimator.demo.interrupts import SIGNALS, held_back, interrupt_on_signals
+from crash_estimator.demo.interrupts import SIGNALS, held_back, interrupted_by_signals
 from crash_replay.ros_runtime import run
 
 
@@ -59,15 +59,15 @@ def test_a_signal_in_a_callback_and_while_the_node_is_made_takes_nothing_away(nu
 
 @pytest.mark.parametrize("number", SIGNALS)
 def test_what_the_demonstration_is_at_is_finished_before_an_interrupt(number):
-    interrupt_on_signals()
     done = []
-    with pytest.raises(KeyboardInterrupt):
-        with held_back():
+    with interrupted_by_signals():
+        with pytest.raises(KeyboardInterrupt):
+            with held_back():
+                os.kill(os.getpid(), number)
+                done.append(1)
+            done.append(2)
+        assert done == [1]
+        with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), number)
-            done.append(1)
-        done.append(2)
-    assert done == [1]
-    with pytest.raises(KeyboardInterrupt):
-        os.kill(os.getpid(), number)
-        done.append(3)
+            done.append(3)
     assert done == [1]

@@ -6,7 +6,9 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 
+from crash_replay.fault import guarded
 from crash_replay.said import say
+from crash_replay.starting import begin, held
 from crash_replay.synthetic.recordings import simulate_recording
 
 from .core.diagnosis import diagnose
@@ -43,10 +45,15 @@ def timed(step: str) -> float:
 
 
 def main() -> int:
+    return guarded(_main)
+
+
+def _main() -> int:
     """A line on each step when it is done -> exit status 1 where one has failed: it is compiled when it is used."""
     failed = 0
-    with ProcessPoolExecutor(len(STEPS), mp_context=get_context("spawn")) as pool:
-        steps = {pool.submit(timed, step): step for step in STEPS}
+    with ProcessPoolExecutor(len(STEPS), mp_context=get_context("spawn"), initializer=begin) as pool:
+        with held():
+            steps = {pool.submit(timed, step): step for step in STEPS}
         for number, future in enumerate(as_completed(steps), 1):
             error = future.exception()
             failed += error is not None

@@ -53,9 +53,11 @@ class Audience:
         return [name for name in self._listeners() if self.words.state(name, run, sent) not in through]
 
     def lacking(self, run: int, sent: int) -> list[str]:
-        """A line on each listener that has not left by its own will and lacks some of these samples."""
-        here = [name for name in self._listeners() if self.words.state(name) != State.LEFT]
-        found = {name: self.words.lacks(name, run, sent) for name in here}
+        """A line on each listener that lacks some of these samples, also where it has left by its own will.
+
+        It says so itself, but its terminal may be closed, and its disk full.
+        """
+        found = {name: self.words.lacks(name, run, sent) for name in self._listeners()}
         return [f"{name} has {lacks}" for name, lacks in found.items() if lacks]
 
     def look(self, reached: Progress) -> list[Listener]:

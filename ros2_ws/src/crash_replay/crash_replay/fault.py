@@ -13,11 +13,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .foreign_text import visible
+from .starting import ENDING, leave
 
 DONE, AT_FAULT = 0, 1
 INTERRUPTED, NOBODY_READS = 128 + signal.SIGINT, 128 + signal.SIGPIPE
 """As a shell reports a program that a signal has ended."""
-ENDING = (signal.SIGTERM, signal.SIGHUP)
+
+AGAIN = 0.02
+"""s after which a signal comes once more whose exception was lost."""
 
 TRACEBACK = "CRASH_TRACEBACK"
 LONGEST = 1000
@@ -49,7 +52,7 @@ def guarded(command: Callable[[], int | None], also: tuple[type[Exception], ...]
     also: exceptions that are no fault of the program either, with a message that can be read.
     """
     try:
-        with _signals_end_it(), _threads_complain() as failed:
+        with _signals_end_it(), _no_signal_is_lost(), _threads_complain() as failed:
             return command() or (AT_FAULT if failed else DONE)
     except Usage:
         raise
@@ -71,20 +74,43 @@ def guarded(command: Callable[[], int | None], also: tuple[type[Exception], ...]
 
 @contextmanager
 def _signals_end_it() -> Iterator[None]:
-    """Like Ctrl-C, unless they are dealt with already: a file that is half written would stay."""
+    """Like Ctrl-C, unless they are dealt with already: a file that is half written would stay.
+
+    Who deals with them himself, as a node does, still does so afterwards: no signal changes how it has ended.
+    """
     ours = threading.current_thread() is threading.main_thread()
-    default = [number for number in ENDING if ours and signal.getsignal(number) is signal.SIG_DFL]
+    free = [number for number in ENDING if ours and signal.getsignal(number) in (signal.SIG_DFL, leave)]
 
     def end(number: int, _) -> None:
         raise Ended(number)
 
-    for number in default:
-        signal.signal(number, end)
+    try:
+        for number in free:
+            signal.signal(number, end)
+        yield
+    finally:
+        for number in free:
+            if signal.getsignal(number) is end:
+                signal.signal(number, signal.SIG_DFL)
+
+
+@contextmanager
+def _no_signal_is_lost() -> Iterator[None]:
+    """Where Python cannot let an exception rise, in a callback of numba's for one, a signal's comes again."""
+    before = sys.unraisablehook
+
+    def again(of) -> None:
+        if isinstance(of.exc_value, Ended | KeyboardInterrupt):
+            number = of.exc_value.args[0] if isinstance(of.exc_value, Ended) else signal.SIGINT
+            threading.Timer(AGAIN, os.kill, (os.getpid(), number)).start()
+        else:
+            before(of)
+
+    sys.unraisablehook = again
     try:
         yield
     finally:
-        for number in default:
-            signal.signal(number, signal.SIG_DFL)
+        sys.unraisablehook = before
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from rclpy.task import Future
 
 from .fault import guarded, tell
 from .middleware import prepare_middleware
+from .starting import ENDING
 
 LOOK = 0.1
 """s between two looks at whether a signal has come."""
@@ -42,13 +43,13 @@ def run(
 
 
 def _run(make: Callable[[], Node], until: Callable[[Node], Future], close: Callable[[Node], str | None]) -> int:
-    prepare_middleware()
     # A signal must end the node between two callbacks, not take the context away under the executor.
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     signals: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in ENDING:
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:  # nohup is respected
             signal.signal(number, lambda number, _: signals.append(number))
+    prepare_middleware()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node, executor, incomplete = None, EventsExecutor(), None
     try:
         node = make()

@@ -8,6 +8,7 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from crash_replay.output import named
+from crash_replay.starting import begin, held
 from crash_replay.synthetic import hidden
 
 from ..core import diagnosis, effects
@@ -63,6 +64,8 @@ def judged(cases: Iterable[Case], processes: int) -> Iterator[dict]:
 def in_processes(function: Callable[[Case], dict], cases: list[Case], processes: int) -> Iterator[dict]:
     """Fresh processes: each reads its number of threads as it starts."""
     mark = {"code": code()}
-    with get_context("spawn").Pool(processes) as pool:
+    with held():
+        pool = get_context("spawn").Pool(processes, initializer=begin)
+    with pool:
         for row in pool.imap_unordered(function, cases):
             yield row | mark

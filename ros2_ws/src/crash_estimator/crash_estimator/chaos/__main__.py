@@ -11,12 +11,11 @@ from crash_replay.said import say
 from ..figures import write_markdown
 from .case import case_of
 from .judge import FAILED
-from .page import page
+from .page import FIRST_START, page
 from .plan import MEMBERS, plan
 from .results import RESULTS, kept, references, rows
 
 RUNS, SEED = 200, 1
-FIRST_START = "demo/frontal/busy+cold_caches"
 
 
 def main() -> int:

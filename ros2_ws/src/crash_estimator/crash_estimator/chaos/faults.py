@@ -4,6 +4,7 @@ import resource
 import signal
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Protocol
 
 from .case import FINISHED, FULL_DISK, HANG_UP, KILL, LASTING, PLAYED, RESTART, STOP, Fault
@@ -66,7 +67,8 @@ class Faults:
         elif fault.kind == FULL_DISK:
             for one in [process, *children_of(process)]:
                 full = max(furthest_written(one), ROOM)
-                resource.prlimit(one, resource.RLIMIT_FSIZE, (full, full))
+                with suppress(ProcessLookupError):  # it has ended meanwhile
+                    resource.prlimit(one, resource.RLIMIT_FSIZE, (full, full))
         else:
             send(process, signal.SIGKILL)
         if fault.kind in LASTING:

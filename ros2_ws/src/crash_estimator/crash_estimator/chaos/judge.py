@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 COMPLETE, SAID, FAILED = "complete", "said", "FAILED"
 
-TELLING = re.compile(r"incomplete|\berror:|too early|not ready|was killed|cannot|without")
+TELLING = re.compile(r"incomplete|\berror:|too early|not ready|was killed|cannot|without|interrupted")
 """In a line that may say that something is incomplete; it must also name whose product it is, or be of him."""
 FAULTY = re.compile(
     r"Traceback \(most recent|Error occurred at:|Fatal Python error|terminate called|Segmentation fault|Aborted"

@@ -18,6 +18,7 @@ from threading import Thread
 from ament_index_python.packages import get_package_prefix
 
 from crash_replay.processes import has_ended
+from crash_replay.starting import held
 
 from ..demo.children import end_with
 
@@ -41,15 +42,16 @@ class Member:
             out = file.fileno()
             if self.terminal:
                 master, out = pty.openpty()
-            self.process = subprocess.Popen(
-                self.command,
-                stdin=out if self.terminal else subprocess.DEVNULL,
-                stdout=out,
-                stderr=subprocess.STDOUT,
-                env=self.environment,
-                start_new_session=True,
-                preexec_fn=partial(_prepare, os.getpid(), self.terminal),
-            )
+            with held():
+                self.process = subprocess.Popen(
+                    self.command,
+                    stdin=out if self.terminal else subprocess.DEVNULL,
+                    stdout=out,
+                    stderr=subprocess.STDOUT,
+                    env=self.environment,
+                    start_new_session=True,
+                    preexec_fn=partial(_prepare, os.getpid(), self.terminal),
+                )
         if self.terminal:
             os.close(out)
             Thread(target=self._show, args=(master,), daemon=True).start()

@@ -19,16 +19,25 @@ does not end.
 
 The uses: `estimators`, a replay, two estimators and `record` in terminals of their own; `terminals`, these and
 the diagnosis; `shown`, the estimators and the viewer; `demo`, the demonstration without its viewer;
-`demo_shown`, with it. What the viewer writes is judged by its exit status alone. Nothing here starts
-`live.launch.py`: launch is not among the wheels, its tests run it against stand-ins. A full disk is a limit on
-the size of what a process writes, from that moment on.
+`demo_shown`, with it; `launch`, what `live.launch.py` describes, with diagnosis and `record`. What the viewer
+writes is judged by its exit status alone. launch is not among the wheels: a stand-in of ours starts the
+processes of the launch file, calls its handlers when one ends, and ends the others as launch does; `launch`
+itself is only stopped, never killed. A full disk is a limit on the size of what a process writes, from that
+moment on; it holds for the shared memory of the middleware too, so that who is stopped meanwhile may hear that
+process no more, asks in vain, and is named when the replay has waited its `finish_timeout`.
 
 A case's name is all that decides it: use, recording, and each fault as `kind:member@moment:duration`, the
 moment in s since the member's start, in % of the samples sent, or in s after the last sample. `make chaos
 ARGS="--case NAME"` does it again."""
 
 
+FIRST_START = "demo/frontal/busy+cold_caches"
+"""The demonstration where nothing is compiled yet and eight other processes keep the machine busy."""
+
+
 def page(rows: Sequence[dict]) -> str:
+    firsts = [row for row in rows if row["case"] == FIRST_START]
+    rows = [row for row in rows if row["case"] != FIRST_START]
     runs = Counter((row["seed"], row["code"]) for row in rows)
     counted = "Of them: " + "; ".join(
         f"seed {seed}, code {code}: {count} runs" for (seed, code), count in sorted(runs.items())
@@ -38,8 +47,14 @@ def page(rows: Sequence[dict]) -> str:
     parts += [f"In {idle} of them a fault found nobody to befall any more: the run was over before its moment."] * bool(
         idle
     )
-    parts += [_table(rows), _failed(rows)]
+    parts += [_table(rows), _failed(rows), _first_start(firsts)]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _first_start(rows: Sequence[dict]) -> str:
+    said = "; ".join(f"{row['verdict']}, {row['seconds']:.0f} s (code {row['code']})" for row in rows)
+    what = "The first demonstration of all, nothing compiled yet, beside eight busy processes"
+    return f"{what} (`--first-start`): {said}." if rows else ""
 
 
 def _counts(rows: Sequence[dict]) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from .case import COLD_CACHES, FINISHED, FULL_DISK, HANG_UP, KILL, ONE_CORE, PLAYED, RESTART, STARTED, STOP, Case, Fault
 from .recordings import RECORDINGS
-from .uses import DEMOS
+from .uses import STARTER
 
 MEMBERS = {
     "estimators": ("replay", "kalman", "rls", "record"),
@@ -13,6 +13,7 @@ MEMBERS = {
     "shown": ("replay", "kalman", "rls", "record", "viewer"),
     "demo": ("demo", "replay", "estimator", "diagnosis", "worker"),
     "demo_shown": ("demo", "replay", "estimator", "diagnosis", "viewer"),
+    "launch": ("launch", "replay", "estimator", "diagnosis", "worker", "record"),
 }
 """Of each use, those that a fault may befall."""
 WRITING = ("record", "viewer")
@@ -28,6 +29,7 @@ TURNS = (
     "demo",
     "terminals",
     "demo_shown",
+    "launch",
 )
 """In turn."""
 STOPS = ((0.5, 3.0), (0.5, 3.0), (3.0, 8.0), (10.0, 20.0))
@@ -45,8 +47,8 @@ EVERY_SECOND_FAULT, EVERY_ONE_CORE, EVERY_LONG_STOP, EVERY_COLD = 4, 8, 43, 101
 def plan(seed: int, runs: int, uses: Sequence[str] = tuple(MEMBERS)) -> list[Case]:
     """The same cases for the same seed, and any beginning of them a mixture of all."""
     draw, turns = random.Random(seed), [use for use in TURNS if use in uses]
-    rounds = [k // len(turns) for k in range(runs)]
-    return [_case(draw, k, k + rounds[k], turns[k % len(turns)]) for k in range(runs)]
+    rounds = [divmod(k, len(turns)) for k in range(runs)]
+    return [_case(draw, k, number + turn, turns[turn]) for k, (number, turn) in enumerate(rounds)]
 
 
 def _case(draw: random.Random, turn: int, kind: int, use: str) -> Case:
@@ -65,7 +67,7 @@ def _case(draw: random.Random, turn: int, kind: int, use: str) -> Case:
 
 
 def _fault(draw: random.Random, use: str, kind: str) -> Fault:
-    if kind == RESTART and use in DEMOS:  # which starts nobody again
+    if not any(_can_befall(kind, use, member) for member in MEMBERS[use]):  # nobody there is started again, or hung up
         kind = KILL
     members = [member for member in MEMBERS[use] if _can_befall(kind, use, member)]
     member = draw.choice(members)
@@ -85,8 +87,10 @@ def _fault(draw: random.Random, use: str, kind: str) -> Fault:
 def _can_befall(kind: str, use: str, member: str) -> bool:
     if kind == FULL_DISK:
         return member in (*WRITING, "demo")
-    if member == "worker" or (use in DEMOS and member != "demo"):  # somebody else has started it
+    if member == "launch":  # ended by force it leaves its processes behind
+        return kind == STOP
+    if member == "worker" or (use in STARTER and member != "demo"):  # somebody else has started it
         return kind in (KILL, STOP)
     if kind == RESTART:
-        return member not in WRITING and use not in DEMOS  # a second recorder overwrites nothing
+        return member not in WRITING and use not in STARTER  # a second recorder overwrites nothing
     return True

@@ -1,18 +1,18 @@
 """Runs side by side, each judged by a process of its own, and a file of what came of them."""
 
 import json
-import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
 
-from crash_replay.fault import Fault
+from crash_replay.fault import Fault, one_line
+from crash_replay.starting import begin, held
 
 from .case import Case
-from .judge import COMPLETE, Content
+from .judge import COMPLETE, FAILED, Content
 from .recordings import bag_of
-from .run import run_case
+from .run import commit, run_case
 
 RESULTS = "results.jsonl"
 """In the folder of a run's logs: a row of JSON for each case."""
@@ -39,9 +39,8 @@ def rows(
     cases: Sequence[Case], results: Path, found: Mapping[str, dict[str, Content]], jobs: int, seed: int
 ) -> Iterator[dict]:
     """In the order in which they are done; each is added to the file of results."""
-    code = commit()
     for row in _in_processes(cases, results.parent, found, jobs):
-        row |= {"seed": seed, "code": code}
+        row |= {"seed": seed}
         with results.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
         yield row
@@ -51,17 +50,22 @@ def kept(results: Path) -> list[dict]:
     return [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()]
 
 
-def commit() -> str:
-    """Of the code that runs, in short."""
-    asked = ["git", "-C", str(Path(__file__).resolve().parent), "rev-parse", "--short", "HEAD"]
-    try:
-        return subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
-    except (OSError, subprocess.CalledProcessError):
-        return "unknown"
-
-
 def _in_processes(cases, out: Path, found: Mapping, jobs: int) -> Iterator[dict]:
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), max_tasks_per_child=1) as pool:
-        tasks = [pool.submit(run_case, case, out, found[case.undisturbed.name]) for case in cases]
+    spawn = get_context("spawn")
+    with ProcessPoolExecutor(jobs, mp_context=spawn, max_tasks_per_child=1, initializer=begin) as pool:
+        with held():
+            tasks = {pool.submit(run_case, case, out, found[case.undisturbed.name]): case for case in cases}
         for task in as_completed(tasks):
-            yield task.result()
+            error = task.exception()
+            yield not_judged(tasks[task], error) if error else task.result()
+
+
+def not_judged(case: Case, error: BaseException) -> dict:
+    """The row of a case whose judge has failed: the others are judged all the same."""
+    why = f"the judge failed: {one_line(repr(error))}"
+    nothing = {"carried out": [], "not carried out": [], "statuses": {}, "contradictions": {}, "strangers": []}
+    return (
+        {"case": case.name, "code": commit(), "verdict": FAILED, "why": why, "seconds": 0.0}
+        | nothing
+        | {"contents": {}}
+    )

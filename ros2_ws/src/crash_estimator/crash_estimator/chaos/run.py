@@ -3,6 +3,8 @@
 import os
 import shutil
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -13,20 +15,21 @@ from .judge import Content, Ended, Outcome, Verdict, judged
 from .members import Member, children_of, command_line, send
 from .observer import Observer
 from .recordings import bag_of
-from .uses import DEMO, DIAGNOSIS, USES, Broken, estimators_of
+from .uses import DIAGNOSIS, STARTER, USES, Broken, estimators_of
 
-LIMIT = 180.0
-"""s that a run may take, beside the time for which its faults last."""
+LIMIT = 480.0
+"""s that a run may take, beside the time for which its faults last: more than the programs say that they wait."""
 COMPILING = 1020.0
 """s more where nothing is compiled yet."""
 TRIES = 3
 """Of a case, where others on this machine have come into its ROS domain."""
 BURNING = 8
 """Processes beside a busy run."""
+BURNER = [sys.executable, "-c", "from crash_replay.starting import begin; begin()\nwhile True: pass"]
 ENDING = 60.0
 """s for a process that is told to end."""
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-STARTED_BY_DEMO = ("demo", "replay", "diagnosis", "viewer")
+STARTED_BY_ONE = ("demo", "replay", "diagnosis", "viewer", "record")
 """Names of nodes, beside the estimators'."""
 MARKS = {
     "worker": "diagnosis_worker",  # the diagnosis's process that computes
@@ -34,6 +37,7 @@ MARKS = {
     "estimator": "/crash_estimator/estimator ",
     "diagnosis": "/crash_estimator/diagnosis ",
     "viewer": "/crash_estimator/viewer ",
+    "record": "/crash_replay/record ",
 }
 """In the command lines of processes that we have not started ourselves."""
 
@@ -68,7 +72,7 @@ class Run:
             if ONE_CORE in self.conditions:
                 os.sched_setaffinity(0, {min(cores)})  # what is started inherits it
             for k in range((ONE_CORE in self.conditions) + BURNING * (BUSY in self.conditions)):
-                self._start(f"burner {k}", ["sh", "-c", "while :; do :; done"])
+                self._start(f"burner {k}", BURNER)
             self.use = USES[self.case.use](self.case, self.bag, self.folder, self._start, self.observer)
             endless = self._follow()
             ended = self._end()
@@ -115,14 +119,16 @@ class Run:
             member.process.wait()
 
     def _had_all(self, name: str) -> bool:
-        """Whether nobody but itself can know how it ended; the demonstration has nobody beside it."""
+        """Whether nobody but itself can know how it ended; who starts the others has nobody beside it."""
         word = self.observer.words.word(f"/{name}")
-        return name == DEMO or (word is not None and word.total > 0 and word.next >= word.total and not word.missing)
+        return name in STARTER.values() or (
+            word is not None and word.total > 0 and word.next >= word.total and not word.missing
+        )
 
     @property
     def strangers(self) -> list[str]:
         """Nodes that take part and are not of the run: somebody else came upon the same ROS domain."""
-        own = {*self.tops, *self.estimators, *STARTED_BY_DEMO} if DEMO in self.tops else {*self.tops}
+        own = {*self.tops, *self.estimators, *(STARTED_BY_ONE if self.case.use in STARTER else ())}
         return sorted(set(self.observer.words.names()) - {f"/{name}" for name in own})
 
     def _start(self, name: str, command: list[str]) -> Member:
@@ -139,13 +145,16 @@ class Run:
         member = self.tops.get(name)
         if member:
             return member.process.pid if member.status is None else 0
-        starter = self.tops[DIAGNOSIS if DIAGNOSIS in self.tops else DEMO]
+        starter = self._starter()
         mark = MARKS[name]
         return next((child for child in children_of(starter.process.pid) if mark in command_line(child)), 0)
 
     def since_start(self, name: str) -> float:
-        starter = self.tops.get(name) or self.tops[DIAGNOSIS if DIAGNOSIS in self.tops else DEMO]
-        return time.monotonic() - starter.started_at
+        return time.monotonic() - (self.tops.get(name) or self._starter()).started_at
+
+    def _starter(self) -> Member:
+        """Of those that we have not started ourselves."""
+        return self.tops[STARTER.get(self.case.use, DIAGNOSIS)]
 
     @property
     def played(self) -> float:
@@ -156,9 +165,18 @@ class Run:
         return time.monotonic() - self.finished_at if self.finished_at else -1.0
 
 
+def commit() -> str:
+    """Of the code that runs, in short."""
+    asked = ["git", "-C", str(Path(__file__).resolve().parent), "rev-parse", "--short", "HEAD"]
+    try:
+        return subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
 def run_case(case: Case, out: Path, reference: dict[str, Content] | None) -> dict:
     """Its row of results; without a reference it is to become one itself."""
-    began = time.monotonic()
+    began, code = time.monotonic(), commit()
     folder = out / "logs" / case.name.replace("/", "__").replace(":", ".")
     for _ in range(TRIES):
         run = Run(case, folder, out / "recordings")
@@ -173,6 +191,7 @@ def run_case(case: Case, out: Path, reference: dict[str, Content] | None) -> dic
         verdict = judged(outcome, reference or contents)
     return {
         "case": case.name,
+        "code": code,
         "verdict": verdict.verdict,
         "why": verdict.why,
         "seconds": round(time.monotonic() - began, 1),

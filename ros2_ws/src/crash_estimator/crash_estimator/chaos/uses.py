@@ -1,6 +1,7 @@
 """How the project is used in a run: which processes are started, when it is over, what they have made."""
 
 import re
+import sys
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -15,7 +16,7 @@ from .recordings import PLAYING, PLAYING_WITH_RESTART, RECORDINGS
 
 ESTIMATORS = {"kalman": "constrained_kalman", "rls": "rls"}
 """Name -> method."""
-REPLAY, DIAGNOSIS, VIEWER, RECORD, DEMO = "replay", "diagnosis", "viewer", "record", "demo"
+REPLAY, DIAGNOSIS, VIEWER, RECORD, DEMO, LAUNCH = "replay", "diagnosis", "viewer", "record", "demo", "launch"
 TOLD = re.compile(
     r"all samples|what it lacks|not told from|share of|where it fails|the error falls|verdict with it|added to"
 )
@@ -89,16 +90,7 @@ class Terminals:
         made = {f"estimates of {name}": Product(name, said) for name, said in heard(self.observer).items()}
         if any(member.name == DIAGNOSIS for member in self.members):
             made["diagnosis"] = Product(DIAGNOSIS, answers(self.observer))
-        made["recording"] = self._recorded()
-        return made
-
-    def _recorded(self) -> Product:
-        if not self.recording.exists():
-            return Product(RECORD, {})
-        try:
-            return Product(RECORD, recorded(self.recording), says_incomplete(self.recording))
-        except Exception as error:
-            raise Broken(f"{RECORDING} does not open with mcap's reader: {error!r}") from error
+        return made | {"recording": in_file(RECORD, self.recording)}
 
 
 def heard(observer: Observer) -> dict[str, dict[str, str]]:
@@ -108,6 +100,16 @@ def heard(observer: Observer) -> dict[str, dict[str, str]]:
 
 def answers(observer: Observer) -> dict[str, str]:
     return {str(k): v for k, v in observer.final.items()}
+
+
+def in_file(owner: str, recording: Path) -> Product:
+    """Raises Broken."""
+    if not recording.exists():
+        return Product(owner, {})
+    try:
+        return Product(owner, recorded(recording), says_incomplete(recording))
+    except Exception as error:
+        raise Broken(f"{RECORDING} does not open with mcap's reader: {error!r}") from error
 
 
 class Demo:
@@ -138,18 +140,42 @@ class Demo:
         return {line: "" for line in lines if TOLD.match(line)}
 
 
-USES: dict[str, Callable[..., Terminals | Demo]] = {
+class Launch:
+    """The launch file, see `launching`, with the diagnosis and `record`; it ends when all is recorded."""
+
+    def __init__(self, case: Case, bag: Path, folder: Path, start: Start, observer: Observer):
+        self.observer, self.recording = observer, folder / RECORDING
+        short = RECORDINGS[case.recording]
+        given = {"bag": bag, "model": short.model, "rate": f"{short.seconds / PLAYING:.6f}", "record": self.recording}
+        given |= {"diagnosis": "true", "viewer": "false", "exit_when_finished": "true"}
+        told = [f"{name}:={value}" for name, value in given.items()]
+        self.members = [start(LAUNCH, [sys.executable, "-m", "crash_estimator.chaos.launching", *told])]
+
+    def is_over(self) -> bool:
+        return self.members[0].status is not None
+
+    def products(self) -> dict[str, Product]:
+        """Raises Broken."""
+        made = {f"estimates of {name}": Product(LAUNCH, said) for name, said in heard(self.observer).items()}
+        made["diagnosis"] = Product(LAUNCH, answers(self.observer))
+        return made | {"recording": in_file(LAUNCH, self.recording)}
+
+
+USES: dict[str, Callable[..., Terminals | Demo | Launch]] = {
     "estimators": Terminals,
     "terminals": partial(Terminals, also=(DIAGNOSIS,)),
     "shown": partial(Terminals, also=(VIEWER,)),
     "demo": partial(Demo, options=("--no-viewer",)),
     "demo_shown": Demo,
+    "launch": Launch,
 }
 """estimators, shown: without the diagnosis, which takes most of the time; demo: without the viewer."""
-DEMOS = ("demo", "demo_shown")
-"""Those in which one process starts the others."""
+STARTER = {"demo": DEMO, "demo_shown": DEMO, "launch": LAUNCH}
+"""Those in which one process starts the others, and which."""
 
 
 def estimators_of(case: Case) -> list[str]:
     """The names of their nodes; the demonstration calls its own as their model."""
-    return [RECORDINGS[case.recording].model] if case.use in DEMOS else list(ESTIMATORS)
+    if case.use in STARTER:
+        return ["estimator" if case.use == LAUNCH else RECORDINGS[case.recording].model]
+    return list(ESTIMATORS)

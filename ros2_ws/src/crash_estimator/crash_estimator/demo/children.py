@@ -15,6 +15,7 @@ from pathlib import Path
 from ament_index_python.packages import get_package_prefix
 
 from crash_replay.output import named
+from crash_replay.starting import held
 
 POLITE = 16.0
 """s that a process has to end by itself: the viewer writes its file's end."""
@@ -33,7 +34,7 @@ class Child:
     def __init__(self, name: str, command: Sequence[str], log: Path, environment: Mapping[str, str]):
         self.name, self.log = name, log
         self._read = 0  # bytes of the log
-        with log.open("wb") as file:
+        with log.open("wb") as file, held():
             self.process = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,

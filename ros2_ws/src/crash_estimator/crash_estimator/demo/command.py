@@ -30,7 +30,7 @@ from .choice import (
 )
 from .domain import own_environment
 from .folder import claim
-from .interrupts import interrupt_on_signals
+from .interrupts import interrupted_by_signals
 from .terminal import Terminal, near
 
 START_OF_REPLAY = 3600.0
@@ -40,8 +40,12 @@ END_OF_REPLAY = 150.0
 
 
 def main() -> int:
-    interrupt_on_signals()  # what was started is ended
-    return guarded(lambda: demo(_parser().parse_args()))
+    return guarded(_main)
+
+
+def _main() -> int:
+    with interrupted_by_signals():  # what was started is ended
+        return demo(_parser().parse_args())
 
 
 def _parser() -> Parser:

@@ -7,10 +7,16 @@ from contextlib import contextmanager
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-def interrupt_on_signals() -> None:
+@contextmanager
+def interrupted_by_signals() -> Iterator[None]:
     """SIGTERM and SIGHUP as Ctrl-C; Ctrl-C also where a shell without job control has it ignored."""
-    for number in SIGNALS:
-        signal.signal(number, _interrupt)
+    try:
+        for number in SIGNALS:
+            signal.signal(number, _interrupt)
+        yield
+    finally:
+        for number in SIGNALS:
+            signal.signal(number, signal.SIG_DFL)
 
 
 @contextmanager

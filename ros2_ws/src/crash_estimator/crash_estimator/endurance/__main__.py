@@ -10,6 +10,7 @@ from pathlib import Path
 
 from crash_replay.fault import guarded
 from crash_replay.said import say
+from crash_replay.starting import begin, held
 
 from ..figures import markdown_table, write_markdown
 from .methods import METHODS, Endured, endure
@@ -58,8 +59,10 @@ def _run(arguments: argparse.Namespace) -> int:
 def _results(parts: Sequence[str], arguments: argparse.Namespace) -> Iterator[Endured | Grown]:
     if "methods" in parts:
         for method in arguments.methods:  # each in a fresh process: its memory is its own
-            with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-                yield pool.submit(endure, method, arguments.samples).result()
+            with ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=begin) as pool:
+                with held():
+                    task = pool.submit(endure, method, arguments.samples)
+                yield task.result()
     for part, function in (("tests", tests_in_a_row), ("passes", passes_in_a_row)):
         if part in parts:
             yield from function(arguments.out, arguments.times)

@@ -12,6 +12,7 @@ from time import monotonic
 
 from crash_replay.fault import guarded
 from crash_replay.said import say
+from crash_replay.starting import begin, held
 
 from ..core.structure import ModelError
 from ..figures import write_markdown
@@ -126,11 +127,13 @@ class Crew:
         self.pipe, its = self.context.Pipe()
         self.began = self.heard = monotonic()
         self.process = self.context.Process(target=work_through, args=(its, self.work[self.at :]), daemon=True)
-        self.process.start()
+        with held():
+            self.process.start()
         its.close()
 
 
 def work_through(pipe, work: list[tuple[str, str]]) -> None:
+    begin()
     restrict()
     pipe.send(None)
     for target, seed in work:

@@ -4,8 +4,7 @@ import os
 import signal
 import subprocess
 import sys
-import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import Connection, Pipe
@@ -14,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from crash_replay.bag import read_bag
-from crash_replay.fault import Fault
+from crash_replay.fault import Fault, of_the_program
 from crash_replay.recording import Channel, Recording, RecordingError, Test
+from crash_replay.starting import held
 
 from ..core.compile_cache import compiling_said
 from ..core.diagnosis import OnlineAnswer, OnlineDiagnosis, OnlineState, diagnose, final_answer
@@ -97,7 +97,7 @@ class Worker:
     def ask(self, task: Task) -> None:
         """Only while it is not busy: then it takes the task from the pipe as fast as it is put there."""
         self.busy, self.wanted, self.long, self.task = True, True, task.final, task
-        self._pipe.send(task)
+        self._send(task)
 
     def reply(self) -> Reply | None:
         """What has come for the last task since the last look. Raises WorkerError."""
@@ -126,6 +126,10 @@ class Worker:
         self.process.wait()
         self._pipe.close()
 
+    def _send(self, content) -> None:
+        with suppress(ConnectionError):  # killed while it had nothing to do: the next look finds it gone
+            self._pipe.send(content)
+
     def _ended(self) -> Reply | None:
         """The process is gone: another one is asked the same. Raises WorkerError where that has happened too often."""
         status = self.process.wait()
@@ -142,25 +146,39 @@ class Worker:
         self._pipe, its = Pipe()
         # run as __main__ it would send classes of that name
         command = [sys.executable, "-c", f"from {__name__} import main; main({its.fileno()})"]
-        self.process = subprocess.Popen(command, pass_fds=[its.fileno()], stdin=subprocess.DEVNULL)
+        with held(signal.SIGINT, signal.SIGHUP):  # for good: they are for the node, which ends this
+            self.process = subprocess.Popen(command, pass_fds=[its.fileno()], stdin=subprocess.DEVNULL)
         its.close()
-        self._pipe.send(self.setup)
+        self._send(self.setup)
         self.busy, self.wanted, self.long = True, False, False  # until it says that it is there
 
 
 def main(fd: int) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the node, which ends this
+    """Answer what comes through the pipe, until the node at its other end has gone."""
     os.nice(NICENESS)
     with Connection(fd) as node:
-        structure, effects_file, bags = node.recv()
+        said = node_says(node)
+        if (setup := next(said, None)) is None:
+            return
+        structure, effects_file, bags = setup
         effects = EFFECTS | (load_effects(effects_file) if effects_file else {})
         with compiling_said(partial(print, "diagnosis:", file=sys.stderr, flush=True)):
             Answerer(effects).try_out(structure)
         answerer = Answerer(effects, [read_bag(bag) for bag in bags])
-        node.send(Reply(None))
-        with suppress(EOFError, ConnectionError):  # the node has gone
-            while True:
-                node.send(_reply(answerer, node.recv()))
+        with suppress(ConnectionError):  # it has gone
+            node.send(Reply(None))
+            for task in said:
+                node.send(_reply(answerer, task))
+
+
+def node_says(node: Connection) -> Iterator[tuple | Task]:
+    """What comes from it as long as it is there: killed, it may leave half a message."""
+    while True:
+        try:
+            content = node.recv()
+        except (EOFError, OSError):
+            return
+        yield content
 
 
 def _reply(answerer: Answerer, task: Task) -> Reply:
@@ -170,6 +188,5 @@ def _reply(answerer: Answerer, task: Task) -> Reply:
         return Reply(None, " ".join(str(error).split()))
     except np.linalg.LinAlgError as error:
         return Reply(None, f"the fit broke down ({error})" if task.final else "")
-    except Exception as error:  # a fault, ours or in a user's effect: said by its name, and the log has where it is
-        traceback.print_exc()
-        return Reply(None, f"the diagnosis failed: {' '.join(f'{type(error).__name__}: {error}'.split())}")
+    except Exception as error:  # ours, or in a user's effect
+        return Reply(None, f"the diagnosis failed: {of_the_program(error)}")
