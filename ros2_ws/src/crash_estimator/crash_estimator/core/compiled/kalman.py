@@ -15,6 +15,7 @@ from numba import njit
 
 from ..estimators.kalman import SMALLEST_SHARE
 from ..kinematics import FEWEST, RECORD
+from ..regression import QUIETEST
 from .factors import add_square, observe, product_of, seen_through, widen
 
 
@@ -102,5 +103,4 @@ def kalman_step(plan, method, n, s, row, dt, known, gradient, active, walk, lear
             product = residual * innovation
             if product == product:
                 s.noise[i] += share * (max(product, 0.0) - s.noise[i])
-            if learnt[i] == learnt[i]:
-                s.noise[i] = max(s.noise[i], learnt[i])
+            s.noise[i] = max(s.noise[i], learnt[i] if learnt[i] == learnt[i] else QUIETEST**2)

@@ -11,7 +11,9 @@ products is that of columns beside one another, and turned into as few columns a
 The process noise R1 follows the crush, because stiffness is a function of crush: the variance grows by
 (drift theta)^2 for each e-fold of crush, and not at all while nothing moves. R2 starts from the noise
 before the impact (or the model's `noise`) and adapts:  E[residual innovation] = R2  holds for any gain that
-is optimal, so its running mean over `noise_memory` estimates what the model cannot follow as well.
+is optimal, so its running mean over `noise_memory` estimates what the model cannot follow as well. It does not fall below
+the noise before the impact, or where that is not known below QUIETEST: a stiffness that drifts as fast as the samples come
+follows each of them exactly, and then R2 would shrink to the rounding of the measurement.
 
 Crush is integrated twice from accelerations whose zero is known no better than the mean of n noisy samples, so
 that a stiff element's force is wrong by K b t^2 / 2. With `offsets` these errors b, one for each measured body, are
@@ -28,7 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..regression import Regression
+from ..regression import QUIETEST, Regression
 from .update import Theta, Update, within_bounds
 
 SMALLEST_SHARE = 0.05
@@ -114,7 +116,7 @@ class Kalman:
             return noise
         share = regression.dt / (regression.dt + self.noise_memory)
         adapted = noise + share * (np.where(np.isnan(products), noise, np.maximum(products, 0.0)) - noise)
-        return np.fmax(adapted, regression.noise)
+        return np.maximum(adapted, np.nan_to_num(regression.noise, nan=QUIETEST**2))
 
 
 def _with_offsets(root: np.ndarray, variance: np.ndarray) -> np.ndarray:
