@@ -17,6 +17,7 @@ from .loops import Loops
 from .missing import Missing, cast_with
 from .motion import Motion
 from .pen import Pen
+from .sinks import send_layout
 from .states import States
 from .summary import Summary
 
@@ -42,7 +43,7 @@ class Show:
         self.cast = cast
         self.pen.restyle()
         self.motion.set_cast(cast)
-        self.recording.send_blueprint(blueprint(cast), make_active=self.activate)
+        send_layout(self.recording, blueprint(cast), self.activate)
 
     def write(self, items: Sequence[Block | EventBlock | Finding]) -> None:
         """What members of the cast and the diagnosis say, in the order it came; the more at a time, the cheaper."""
