@@ -45,11 +45,12 @@ class Pass:
         first: bool,
         attempt: Attempt,
         jury: Jury,
+        sent: list[Cast],
     ):
-        """first: of the session; attempt: as in Show."""
+        """first: of the session; attempt, sent: as in Show, the latter of the live recordings."""
         self.recordings = [live, file[0]] if file else [live]
         self.path = file[1] if file else None
-        self.expected, self.first, self.attempt = expected, first, attempt
+        self.expected, self.first, self.attempt, self.sent = expected, first, attempt, sent
         self.jury: Jury | None = jury  # None: it has judged
         self.shows: list[Show] = []  # one for each recording
         self.test: TestBlock | None = None
@@ -185,7 +186,8 @@ class Pass:
         for name in present:
             cast = cast.with_member(members[name])
         if not self.shows:
-            self.shows = [Show(recording, cast, self.first, self.attempt) for recording in self.recordings]
+            sent = [self.sent, None]  # a file has its own
+            self.shows = [Show(r, cast, self.first, self.attempt, s) for r, s in zip(self.recordings, sent)]
         elif cast != self.shows[0].cast:
             for show in self.shows:
                 show.set_cast(cast)

@@ -13,6 +13,7 @@ from crash_replay.scheduling import step_back
 from ..core.structure import Structure
 from ..rush import Rush
 from .blocks import Block, EventBlock, TestBlock
+from .cast import Cast
 from .findings import Finding
 from .judged import Jury
 from .passes import Pass
@@ -91,6 +92,7 @@ class Recorder:
         self._replay = 0  # a replay that is started again counts its runs from 0 again
         self._passes: dict[tuple[int, int], Pass] = {}  # by (replay, run), the newest last: the first, the last two and
         self._over = (-1, 0)  # those with a file; the newest of the others, which have ended and been forgotten
+        self._sent: list[Cast] = []  # whose layouts the live viewers have
         self._spare: Pass | None = self._open()  # its server is up before the first sample
         self._troubles = Complaints(say)
         self._left_out: dict[str, None] = {}  # what could not be drawn, and why
@@ -263,7 +265,7 @@ class Recorder:
         have_one = any(pass_.path and pass_.complete for pass_ in self._passes.values())
         file = None if have_one else self.sinks.open_file()
         live, jury = self.sinks.open_live(), Jury(self.structure_of)
-        return Pass(live, file, self.expected, not self._passes, self._guarded, jury)
+        return Pass(live, file, self.expected, not self._passes, self._guarded, jury, self._sent)
 
     def _guarded(self, action: Callable):
         """A block that cannot be drawn is said and left out; the rest goes on."""
