@@ -1,9 +1,10 @@
-"""A million steps leave the covariance symmetric and positive, with and without process noise."""
+"""Many steps leave the covariance symmetric and positive, with and without process noise, and whatever the noise is."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from crash_estimator.core.compiled.factors import product_of, widen
 from crash_estimator.core.compiled.kalman import kalman_update
 from crash_estimator.core.estimators.kalman import Kalman
 from crash_estimator.core.estimators.update import Theta
@@ -19,6 +20,12 @@ def gradients(n=1000):
     return np.stack([np.stack([-x, -v, 0.0 * t], 1) / 10.0, np.stack([x, v, -y], 1) / 1000.0], axis=1)
 
 
+def covariance_of(factors):
+    covariance = np.empty_like(factors)
+    product_of(factors, covariance)
+    return covariance
+
+
 def check(covariance):
     assert_array_equal(covariance, covariance.T)
     scaled = covariance / np.outer(SCALE, SCALE)
@@ -29,21 +36,21 @@ def check(covariance):
 @pytest.mark.parametrize(("drift", "steps"), [(0.0, 1_000_000), (1e-6, 200_000)])
 def test_a_million_compiled_steps(drift, steps):
     psi, noise, target = gradients(), np.array([1.0, 1e-4]), np.array([3.0, np.nan])
-    theta, covariance = SCALE.copy(), np.diag(SCALE**2)
-    active, clamped, bound = np.ones(3), np.zeros(3), np.full(3, np.inf)
-    walk = np.arange(3), np.arange(3)
+    theta, factors = SCALE.copy(), np.diag(SCALE**2)
+    active, clamped, bound, unit = np.ones(3), np.zeros(3), np.full(3, np.inf), np.empty(3)
     for k in range(steps):
-        covariance[walk] += (drift * SCALE) ** 2
+        for j in range(3 if drift else 0):
+            widen(factors, (drift * SCALE[j]) ** 2, j, unit)
         target[1] = np.nan if k % 7 else 0.01  # now and then a dropout
-        kalman_update(theta, covariance, noise, psi[k % len(psi)], target, active, -bound, bound, False, clamped)
+        kalman_update(theta, factors, noise, psi[k % len(psi)], target, active, -bound, bound, False, clamped)
         if k % 100_000 == 0:
-            check(covariance)
-    check(covariance)
+            check(covariance_of(factors))
+    check(covariance_of(factors))
     assert np.isfinite(theta).all()
 
 
 def test_ten_thousand_readable_steps():
-    """The numpy form, in Joseph's form as well; slower, so fewer."""
+    """The numpy form; slower, so fewer."""
     nothing, unbounded = np.zeros(3), np.full(3, np.inf)
     settings = Theta(("k", "c", "l"), SCALE, SCALE, -unbounded, unbounded, SCALE)
     method, psi = Kalman(settings, noise_memory=0, offsets=False), gradients()

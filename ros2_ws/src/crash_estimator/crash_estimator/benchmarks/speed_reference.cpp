@@ -1,7 +1,7 @@
 // The same recursions as straight loops: what a compiler makes of them is the limit to compare with.
 //
-// n samples, p parameters, q equations; psi (n, q, p), y (n, q), walk (n, p), active (n, p); theta (p) and P (p, p) or
-// S (p, p) are changed in place. Every function returns a checksum, so that nothing is optimised away.
+// n samples, p parameters, q equations; psi (n, q, p), y (n, q), walk (n, p), active (n, p); theta (p) and F or S (p, p)
+// are changed in place. Every function returns a checksum, so that nothing is optimised away.
 
 #include <algorithm>
 #include <cmath>
@@ -9,44 +9,79 @@
 
 const int P = 64;
 
+// P = U D U', row j of F being column j of U up to D_j on the diagonal; P + c a a' where a is zero beyond `last`.
+static void add_square(int p, double* F, double c, double* a, int last) {
+    for (int j = last; j >= 0; j--) {
+        double d = F[j * p + j], part = c * a[j], grown = d + part * a[j];
+        if (grown == 0.0) continue;
+        F[j * p + j] = grown;
+        c *= d / grown;
+        double share = part / grown;
+        for (int i = 0; i < j; i++) {
+            a[i] -= a[j] * F[j * p + i];
+            F[j * p + i] += share * a[i];
+        }
+    }
+}
+
+// P - (P h')(P h')' / s -> s; b becomes P h'.
+static double observe(int p, double* F, const double* h, double r, double* b) {
+    double s = r;
+    for (int j = 0; j < p; j++) {
+        double f = h[j];
+        for (int i = 0; i < j; i++) f += F[j * p + i] * h[i];
+        double before = s, part = F[j * p + j] * f;
+        b[j] = part;
+        if (part * f == 0.0) continue;
+        s = before + part * f;
+        F[j * p + j] *= before / s;
+        double share = before > 0.0 ? f / before : 0.0;
+        for (int i = 0; i < j; i++) {
+            double u = F[j * p + i];
+            F[j * p + i] = u - share * b[i];
+            b[i] += part * u;
+        }
+    }
+    return s;
+}
+
 extern "C" double constrained_kalman(int n, int p, int q, const double* psi, const double* y, const double* walk,
                                      const double* active, const double* noise, const double* lower,
-                                     const double* scale, double* theta, double* cov) {
-    double start[P], prior[P * P], free_[P], spread[P], gain[P], sum = 0.0;
+                                     const double* scale, double* theta, double* F) {
+    double start[P], prior[P * P], free_[P], seen[P], b[P], sum = 0.0;
     for (int t = 0; t < n; t++) {
         const double *H = psi + t * q * p, *z = y + t * q;
         for (int j = 0; j < p; j++) {
+            if (walk[t * p + j] == 0.0) continue;
             double size = std::max(std::fabs(theta[j]), 0.05 * scale[j]);
-            cov[j * p + j] += walk[t * p + j] * size * size;
+            std::fill(b, b + p, 0.0);
+            b[j] = 1.0;
+            add_square(p, F, walk[t * p + j] * size * size, b, j);
         }
         std::memcpy(start, theta, p * sizeof(double));
-        std::memcpy(prior, cov, p * p * sizeof(double));
+        std::memcpy(prior, F, p * p * sizeof(double));
         std::memcpy(free_, active + t * p, p * sizeof(double));
         for (bool again = true; again;) {
             std::memcpy(theta, start, p * sizeof(double));
-            std::memcpy(cov, prior, p * p * sizeof(double));
+            std::memcpy(F, prior, p * p * sizeof(double));
             for (int i = 0; i < q; i++) {
                 const double* h = H + i * p;
-                double s = noise[i], error = z[i], r = noise[i];
+                double error = z[i];
+                int last = -1;
                 for (int j = 0; j < p; j++) {
-                    double total = 0.0;
-                    for (int k = 0; k < p; k++) total += cov[j * p + k] * h[k] * free_[k];
-                    spread[j] = total;
-                }
-                for (int j = 0; j < p; j++) {
-                    s += h[j] * free_[j] * spread[j];
                     error -= h[j] * theta[j];
+                    seen[j] = h[j] * free_[j];
                 }
+                double s = observe(p, F, seen, noise[i], b);
                 for (int j = 0; j < p; j++) {
-                    gain[j] = free_[j] * spread[j] / s;
-                    theta[j] += gain[j] * error;
+                    if (free_[j] == 1.0) {
+                        theta[j] += b[j] / s * error;
+                        b[j] = 0.0;
+                    } else if (b[j] != 0.0) {
+                        last = j;
+                    }
                 }
-                for (int j = 0; j < p; j++) {
-                    double remaining = spread[j] - gain[j] * (s - r);
-                    for (int k = 0; k <= j; k++)
-                        cov[j * p + k] = cov[k * p + j] =
-                            cov[j * p + k] - gain[j] * spread[k] - remaining * gain[k] + r * gain[j] * gain[k];
-                }
+                add_square(p, F, 1.0 / s, b, last);
             }
             again = false;
             for (int j = 0; j < p; j++)

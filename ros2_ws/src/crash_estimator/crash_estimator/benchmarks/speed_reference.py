@@ -75,9 +75,9 @@ class Compiled:
     def constrained_kalman(self, problem: Problem) -> np.ndarray:
         """theta (p,) after the whole record."""
         n, q, p = problem.psi.shape
-        theta, covariance = problem.initial.copy(), np.diag(problem.std**2)
+        theta, factors = problem.initial.copy(), np.diag(problem.std**2)
         samples = problem.psi, problem.target, problem.walk, problem.active
-        arrays = *samples, problem.noise, problem.lower, problem.scale, theta, covariance
+        arrays = *samples, problem.noise, problem.lower, problem.scale, theta, factors
         self.library.constrained_kalman(n, p, q, *map(_pointer, arrays))
         return theta
 

@@ -8,6 +8,7 @@ from numba import njit
 
 from crash_replay.synthetic.recordings import SCENARIOS
 
+from ..core.compiled.factors import widen
 from ..core.compiled.kalman import kalman_update
 from ..core.estimators.kalman import SMALLEST_SHARE
 from ..core.fold import run
@@ -21,18 +22,20 @@ SETTINGS = {"forgetting": 0.98, "m": 5, "cr": 3.0, "error_limit": 2.58, "rewinds
 
 
 @njit(cache=True)
-def _filter(theta, covariance, noise, psi, target, walk, active, lower, upper, scale, smallest, clamped):
+def _filter(theta, factors, noise, psi, target, walk, active, lower, upper, scale, smallest, clamped):
+    unit = np.empty(len(theta))
     for t in range(len(psi)):
         for j in range(len(theta)):
-            covariance[j, j] += walk[t, j] * max(abs(theta[j]), smallest * scale[j]) ** 2
-        kalman_update(theta, covariance, noise, psi[t], target[t], active[t], lower, upper, True, clamped)
+            if walk[t, j] > 0.0:
+                widen(factors, walk[t, j] * max(abs(theta[j]), smallest * scale[j]) ** 2, j, unit)
+        kalman_update(theta, factors, noise, psi[t], target[t], active[t], lower, upper, True, clamped)
 
 
 def filtered(problem: Problem) -> np.ndarray:
     """theta (p,) after the record, by the project's compiled filter alone."""
-    theta, covariance = problem.initial.copy(), np.diag(problem.std**2)
+    theta, factors = problem.initial.copy(), np.diag(problem.std**2)
     _filter(
-        theta, covariance, problem.noise, problem.psi, problem.target, problem.walk, problem.active, problem.lower,
+        theta, factors, problem.noise, problem.psi, problem.target, problem.walk, problem.active, problem.lower,
         problem.upper, problem.scale, SMALLEST_SHARE, np.zeros(len(theta)),
     )  # fmt: skip
     return theta
@@ -48,10 +51,10 @@ def steps(folder: Path) -> Iterator[Row]:
 
 def _kalman_calls(structure, recording, problem: Problem) -> Iterator[Row]:
     k = len(problem.psi) // 2
-    theta, covariance, clamped = problem.initial.copy(), np.diag(problem.std**2), np.zeros(len(problem.initial))
+    theta, factors, clamped = problem.initial.copy(), np.diag(problem.std**2), np.zeros(len(problem.initial))
     sample = (problem.psi[k].copy(), problem.target[k].copy(), problem.active[k].copy())
     bounds = problem.lower, problem.upper
-    alone = per_call(lambda: kalman_update(theta, covariance, problem.noise, *sample, *bounds, True, clamped))
+    alone = per_call(lambda: kalman_update(theta, factors, problem.noise, *sample, *bounds, True, clamped))
     reference = filterpy_step(problem, k)
     theirs = per_call(reference) if reference else None
     said = f"filterpy {microseconds(theirs)}" if theirs else "filterpy is not installed"

@@ -41,7 +41,10 @@ def endure(method: str, samples: int) -> Endured:
         state, estimate = estimator.step(state, sample)
         if sample.number % CHECKED == 0 or sample.number == samples - 1:
             finite &= bool(np.isfinite(estimate.parameters).all() and np.isfinite(estimate.covariance).all())
-            asymmetry, least = max(asymmetry, _asymmetry(estimate.covariance)), min(least, _least(estimate.covariance))
+            asymmetry, least = (
+                max(asymmetry, _asymmetry(estimate.covariance)),
+                min(least, least_eigenvalue(estimate.covariance)),
+            )
         if sample.number == round(SETTLED * samples):
             settled = resident()
     return Endured(method, samples, finite, asymmetry, least, settled, resident())
@@ -92,7 +95,8 @@ def _asymmetry(covariance: np.ndarray) -> float:
     return float(np.abs(covariance - covariance.T).max() / max(np.abs(covariance).max(), 1e-300))
 
 
-def _least(covariance: np.ndarray) -> float:
+def least_eigenvalue(covariance: np.ndarray) -> float:
+    """Of the covariance (p, p) scaled to a diagonal of one; inf where there is none."""
     scale = np.sqrt(np.abs(np.diagonal(covariance)))
     kept = scale > 0.0
     if not kept.any():

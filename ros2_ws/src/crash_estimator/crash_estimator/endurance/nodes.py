@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from crash_msgs.msg import Samples, TestInfo
+from crash_msgs.msg import ReplayState, Samples, TestInfo
 
 from crash_replay.bag import read_bag
 from crash_replay.qos import LATCHED, STREAM
@@ -26,6 +26,11 @@ SHORTEST = 120
 """Samples of a test: one that goes on past the impact."""
 BLOCK = 10
 RECORDING = "frontal"
+PATIENT = {"viewer", "record"}
+"""Who says a second after the last message that it was the last: they are waited for only every so many tests."""
+EVERY = 10
+SERVED = "20MB"
+"""What the viewer keeps for screens that come late: reached long before the memory must be what it stays."""
 
 
 class Size(NamedTuple):
@@ -86,18 +91,28 @@ def graph(folder: Path, nodes: dict[str, list[str]]) -> Iterator[Graph]:
         made.close()
 
 
-def tests_in_a_row(out: Path, times: int) -> list[Grown]:
-    """Tests of other lengths and names each time, sent by this process."""
-    model = RECORDINGS[RECORDING].model
-    nodes = {
+def commands(folder: Path) -> dict[str, list[str]]:
+    """Of all that listen to a replay, by their names; what viewer and record write is in the folder, made anew."""
+    model, recorded = RECORDINGS[RECORDING].model, folder / "record.mcap"
+    recorded.unlink(missing_ok=True)
+    picture = {"rrd": str(folder / "viewer.rrd"), "open": False, "port": 0, "memory_limit": SERVED}
+    return {
         "kalman": node_command("crash_estimator", "estimator", "kalman", model=model),
         "diagnosis": node_command("crash_estimator", "diagnosis", model=model, every=1.0),
+        "viewer": node_command("crash_estimator", "viewer", **picture),
+        "record": node_command("crash_replay", "record", to=str(recorded)),
     }
+
+
+def tests_in_a_row(out: Path, times: int) -> list[Grown]:
+    """Tests of other lengths and names each time, sent by this process."""
+    nodes = commands(out / "tests")
     recording = read_bag(bag_of(RECORDING, out / "recordings"))
     with graph(out / "tests", nodes) as g:
         node, words = g.observer.node, g.observer.words
         test = node.create_publisher(TestInfo, "test", LATCHED)
         samples = node.create_publisher(Samples, "samples", STREAM)
+        state = node.create_publisher(ReplayState, "replay_state", LATCHED)
         g.wait(lambda name: (word := words.word(f"/{name}")) is not None and word.ready, list(nodes), "all are ready")
         g.observer.spin(PATIENCE, lambda: samples.get_subscription_count() >= len(nodes))
         settled = {}
@@ -105,12 +120,16 @@ def tests_in_a_row(out: Path, times: int) -> list[Grown]:
             whole = SHORTEST + k % 7  # so that what is said of the test before is not taken for this one
             message = test_to_msg(recording)
             message.id, message.samples = f"test {k}", whole
+            state.publish(ReplayState(state=ReplayState.PLAYING, total=whole))
             test.publish(message)
             g.observer.spin(0.02)
             _send(recording, whole, samples, g)
+            state.publish(ReplayState(state=ReplayState.FINISHED, number=whole, total=whole))
+            settles = k == round(SETTLED * times)
+            everybody = settles or k % EVERY == EVERY - 1 or k == times - 1
             through = lambda name, whole=whole: _is_through(words.word(f"/{name}"), whole)
-            g.wait(through, list(nodes), f"test {k} is dealt with")
-            if k == round(SETTLED * times):
+            g.wait(through, list(nodes if everybody else nodes.keys() - PATIENT), f"test {k} is dealt with")
+            if settles:
                 settled = g.sizes()
         end = g.sizes()
     return [Grown(name, "tests", times, settled[name], end[name]) for name in nodes]
@@ -123,20 +142,16 @@ def _send(recording: Recording, whole: int, samples, g: Graph) -> None:
 
 
 def _is_through(word, whole: int) -> bool:
-    return word is not None and word.done and word.total == whole and word.next == whole
+    return word is not None and word.done and word.total == whole and not word.missing
 
 
 def passes_in_a_row(out: Path, times: int) -> list[Grown]:
     """A replay that loops."""
-    short = RECORDINGS[RECORDING]
-    nodes = {
-        "kalman": node_command("crash_estimator", "estimator", "kalman", model=short.model),
-        "diagnosis": node_command("crash_estimator", "diagnosis", model=short.model, every=1.0),
-        "replay": node_command(
-            "crash_replay", "replay", bag=str(bag_of(RECORDING, out / "recordings")), loop=True, rate=1.0,
-            listeners=["kalman", "diagnosis"], wait_timeout=PATIENCE,
-        ),
-    }  # fmt: skip
+    nodes = commands(out / "passes")
+    bag = str(bag_of(RECORDING, out / "recordings"))
+    nodes["replay"] = node_command(
+        "crash_replay", "replay", bag=bag, loop=True, rate=1.0, listeners=list(nodes), wait_timeout=PATIENCE
+    )
     with graph(out / "passes", nodes) as g:
         run = lambda: g.observer.state.run if g.observer.state else 0
         began = lambda _: run() >= round(SETTLED * times)

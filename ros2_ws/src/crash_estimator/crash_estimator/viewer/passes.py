@@ -45,16 +45,18 @@ class Pass:
         first: bool,
         attempt: Attempt,
         jury: Jury,
+        sent: list[Cast],
     ):
-        """first: of the session; attempt: as in Show."""
+        """first: of the session; attempt, sent: as in Show, the latter of the live recordings."""
         self.recordings = [live, file[0]] if file else [live]
         self.path = file[1] if file else None
-        self.expected, self.first, self.attempt = expected, first, attempt
+        self.expected, self.first, self.attempt, self.sent = expected, first, attempt, sent
         self.jury: Jury | None = jury  # None: it has judged
         self.shows: list[Show] = []  # one for each recording
         self.test: TestBlock | None = None
         self.began: float | None = None
         self.ended = False
+        self.names: tuple[str, ...] = ()  # of the estimators that it showed, once it has ended
         self.drawn: dict[str, Counter[type]] = {}  # samples, by estimator and kind of block
         self._waiting: list[Block | EventBlock | Finding] = []
         self._unsaved: list[Block | EventBlock | Finding] = []
@@ -66,7 +68,12 @@ class Pass:
         for recording in self.recordings:
             recording.send_recording_name(test.id)
 
-    def write(self, items: Iterable[Block | EventBlock | Finding], at_once: bool = False) -> None:
+    def write(self, items: Iterable[Block | EventBlock | Finding]) -> None:
+        """What comes after the end is left out."""
+        if not self.ended:
+            self._write(items)
+
+    def _write(self, items: Iterable[Block | EventBlock | Finding], at_once: bool = False) -> None:
         """at_once: wait for no other estimator."""
         self._waiting += items
         self.began = self.began or time.monotonic()
@@ -109,13 +116,17 @@ class Pass:
         self.shows[1].write(unsaved)
 
     def end(self, incomplete: str = "") -> None:
-        """Nothing more comes: draw what waits, write the file's footer; incomplete: said in the summary."""
+        """Nothing more comes: draw what waits, write the file's footer, let go of all that took memory.
+
+        incomplete: said in the summary.
+        """
         if self.ended:
             return
         self.ended = True
-        self.write([], at_once=True)
+        self._write([], at_once=True)
         if self._unsaved:
             self._save()
+        self.names = self.shows[0].cast.names if self.shows else ()
         for k in reversed(range(len(self.recordings))):  # the file first, whatever a viewer does
             try:
                 if self.shows:
@@ -123,6 +134,7 @@ class Pass:
                 self.recordings[k].flush(timeout_sec=FLUSHING)
             finally:
                 self.recordings[k].disconnect()
+        self.recordings, self.shows, self.jury, self._heads = [], [], None, {}
 
     @property
     def saved(self) -> bool:
@@ -150,10 +162,9 @@ class Pass:
         return min(self.drawn[name][kind] for kind in KINDS) if name in self.drawn else 0
 
     def report(self) -> str:
-        """One line: the file, and how much of the test is in it."""
+        """After the end, in one line: the file, and how much of the test is in it."""
         total = f" of {self.test.samples}" if self.test else ""
-        names = self.shows[0].cast.names if self.shows else ()
-        drawn = [f"{name} {self._samples(name)}{total} samples" for name in names]
+        drawn = [f"{name} {self._samples(name)}{total} samples" for name in self.names]
         return f"wrote {self.path}: {', '.join(drawn) or 'no samples'}"
 
     def _meet(self, at_once: bool) -> None:
@@ -175,7 +186,8 @@ class Pass:
         for name in present:
             cast = cast.with_member(members[name])
         if not self.shows:
-            self.shows = [Show(recording, cast, self.first, self.attempt) for recording in self.recordings]
+            sent = [self.sent, None]  # a file has its own
+            self.shows = [Show(r, cast, self.first, self.attempt, s) for r, s in zip(self.recordings, sent)]
         elif cast != self.shows[0].cast:
             for show in self.shows:
                 show.set_cast(cast)

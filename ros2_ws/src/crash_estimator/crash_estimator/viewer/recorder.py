@@ -13,10 +13,11 @@ from crash_replay.scheduling import step_back
 from ..core.structure import Structure
 from ..rush import Rush
 from .blocks import Block, EventBlock, TestBlock
+from .cast import Cast
 from .findings import Finding
 from .judged import Jury
 from .passes import Pass
-from .sinks import Sinks
+from .sinks import Sinks, let_go
 
 Item = Block | EventBlock | Finding | TestBlock
 Make = Callable[[], Item]
@@ -89,7 +90,9 @@ class Recorder:
         self._rush, self._stepped_back = Rush(RUSH), False
         self._test: TestBlock | None = None
         self._replay = 0  # a replay that is started again counts its runs from 0 again
-        self._passes: dict[tuple[int, int], Pass] = {}  # by (replay, run), the newest last
+        self._passes: dict[tuple[int, int], Pass] = {}  # by (replay, run), the newest last: the first, the last two and
+        self._over = (-1, 0)  # those with a file; the newest of the others, which have ended and been forgotten
+        self._sent: list[Cast] = []  # whose layouts the live viewers have
         self._spare: Pass | None = self._open()  # its server is up before the first sample
         self._troubles = Complaints(say)
         self._left_out: dict[str, None] = {}  # what could not be drawn, and why
@@ -207,43 +210,62 @@ class Recorder:
         with self._guard:
             batch, self._queue, self._stride, self._held = self._queue, deque(), 1, 0
             self._busy = True
-        made = [self._guarded(entry.make) for entry in batch]
-        for item in made:
+        said: list[Block | EventBlock | Finding] = []  # on the test that was met last
+        nothing = True
+        for item in (self._guarded(entry.make) for entry in batch):
             if isinstance(item, TestBlock):
+                self._write(said)
                 self._meet_test(item)
-        by_run: dict[int, list[Block | EventBlock | Finding]] = {}
-        for item in made:
-            if item is not None and not isinstance(item, TestBlock):
-                by_run.setdefault(item.run, []).append(item)
-        for run in sorted(by_run):
-            self._guarded(lambda run=run: self._pass(run).write(by_run[run]))
-        if not by_run and self._passes:  # who waits for an estimator that does not come waits no longer
+                said = []
+            elif item is not None:
+                said.append(item)
+                nothing = False
+        self._write(said)
+        if nothing and self._passes:  # who waits for an estimator that does not come waits no longer
             self._guarded(lambda: list(self._passes.values())[-1].write([]))
         with self._guard:
             self._busy = False
+
+    def _write(self, items: list[Block | EventBlock | Finding]) -> None:
+        by_run: dict[int, list[Block | EventBlock | Finding]] = {}
+        for item in items:
+            by_run.setdefault(item.run, []).append(item)
+        for run in sorted(by_run):
+            self._guarded(lambda run=run: self._write_pass(run, by_run[run]))
 
     def _meet_test(self, test: TestBlock) -> None:
         if self._test is not None and self._passes:
             self._replay += 1
         self._test = test
 
-    def _pass(self, run: int) -> Pass:
+    def _write_pass(self, run: int, items: list[Block | EventBlock | Finding]) -> None:
         key = (self._replay, run)
+        if key in self._passes or key > self._over:
+            self._pass(key).write(items)
+
+    def _pass(self, key: tuple[int, int]) -> Pass:
         if key not in self._passes:
-            for old in list(self._passes.values())[1:-1]:  # the first one keeps the server, the last may get more
-                old.end()
+            for before in list(self._passes)[1:-1]:  # the first one keeps the server, the last may get more
+                self._end_pass(before)
+            let_go()
             self._passes[key], self._spare = self._spare or self._open(), None
         pass_ = self._passes[key]
         if pass_.test is None and self._test:
             pass_.set_test(self._test)
         return pass_
 
+    def _end_pass(self, key: tuple[int, int]) -> None:
+        self._passes[key].end()
+        self._over = max(self._over, key)
+        if not self._passes[key].path:
+            del self._passes[key]
+
     def _open(self) -> Pass:
         """One complete pass in a file is enough: a test that is replayed in a loop must not fill the disk."""
         have_one = any(pass_.path and pass_.complete for pass_ in self._passes.values())
         file = None if have_one else self.sinks.open_file()
         live, jury = self.sinks.open_live(), Jury(self.structure_of)
-        return Pass(live, file, self.expected, not self._passes, self._guarded, jury)
+        return Pass(live, file, self.expected, not self._passes, self._guarded, jury, self._sent)
 
     def _guarded(self, action: Callable):
         """A block that cannot be drawn is said and left out; the rest goes on."""

@@ -17,6 +17,7 @@ from .loops import Loops
 from .missing import Missing, cast_with
 from .motion import Motion
 from .pen import Pen
+from .sinks import send_layout
 from .states import States
 from .summary import Summary
 
@@ -26,12 +27,22 @@ Attempt = Callable[[Callable[[], Any]], Any]
 class Show:
     """Writes what the estimators say in one run into one Rerun recording."""
 
-    def __init__(self, recording: rr.RecordingStream, cast: Cast, activate: bool, attempt: Attempt):
+    def __init__(
+        self,
+        recording: rr.RecordingStream,
+        cast: Cast,
+        activate: bool,
+        attempt: Attempt,
+        sent: list[Cast] | None = None,
+    ):
         """activate: show this layout at once; otherwise whoever arranged the views anew keeps their arrangement.
 
         attempt: calls what may fail for one estimator and must not harm the others.
+        sent: the casts whose layouts its viewers have, to be added to: layouts hold for all recordings of a session, and
+        the server keeps each of them to the end.
         """
         self.recording, self.activate, self.attempt = recording, activate, attempt
+        self.sent = [] if sent is None else sent
         self.pen = Pen(recording)
         self.curves, self.loops, self.motion = Curves(self.pen), Loops(self.pen), Motion(self.pen)
         self.states, self.summary, self.missing = States(self.pen), Summary(self.pen), Missing(self.pen)
@@ -42,7 +53,9 @@ class Show:
         self.cast = cast
         self.pen.restyle()
         self.motion.set_cast(cast)
-        self.recording.send_blueprint(blueprint(cast), make_active=self.activate)
+        if cast not in self.sent:
+            send_layout(self.recording, blueprint(cast), self.activate)
+            self.sent.append(cast)
 
     def write(self, items: Sequence[Block | EventBlock | Finding]) -> None:
         """What members of the cast and the diagnosis say, in the order it came; the more at a time, the cheaper."""

@@ -10,6 +10,8 @@ import uuid
 from pathlib import Path
 
 import rerun as rr
+import rerun.blueprint as rrb
+from rerun import bindings
 
 from crash_replay.foreign_text import visible
 from crash_replay.output import OutputError, named
@@ -54,6 +56,26 @@ class Sinks:
         recording.set_sinks(rr.FileSink(str(path)))
         self.files += 1
         return recording, path
+
+
+def send_layout(recording: rr.RecordingStream, layout: rrb.Blueprint, make_active: bool) -> None:
+    """As `recording.send_blueprint` does, which for each layout leaves a recording in memory that holds itself."""
+    native = bindings.new_blueprint(
+        application_id=APPLICATION, make_default=False, make_thread_default=False, default_enabled=True
+    )
+    written = rr.RecordingStream._from_native(native)
+    written.set_time("blueprint", sequence=0)
+    layout._log_to_stream(written)
+    bindings.send_blueprint(written.memory_recording().storage, make_active, True, recording=recording.to_native())
+    written.disconnect()
+
+
+def let_go() -> None:
+    """Rerun keeps two threads and the buffers of every recording, of one that nobody holds too, until it is told so.
+
+    See https://github.com/rerun-io/rerun/issues/2116.
+    """
+    bindings.flush_and_cleanup_orphaned_recordings()
 
 
 def _check_replaceable(path: Path) -> None:

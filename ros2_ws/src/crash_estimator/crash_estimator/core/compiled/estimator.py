@@ -46,7 +46,8 @@ class CompiledEstimator:
         memory[fields["contact"]] = ElementState.APART
         offsets = np.zeros(self.size.offsets)  # their variance is known at the first update
         memory[fields["theta"]] = np.concatenate([plan.initial, offsets])
-        memory[fields["covariance"]] = np.diag(np.concatenate([plan.std**2, offsets])).ravel()
+        memory[fields["covariance"]] = np.diag(plan.std**2).ravel()
+        memory[fields["factors"]] = np.diag(np.concatenate([plan.std**2, offsets])).ravel()
         memory[fields["noise"]] = np.nan
         memory[fields["information"]] = np.diag(1.0 / plan.std**2).ravel()
         memory[fields["carried"]] = np.diag(plan.std**2).ravel()

@@ -74,7 +74,7 @@ def _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped):
         elif plan.is_stiffness[j] and plan.unloading[k] > 0.0 and row.state[k] == UNLOADING:
             status = UNLOADS
         row.status[j] = status
-    row.covariance[:, :] = s.covariance[: n.estimated, : n.estimated]
+    row.covariance[:, :] = s.covariance
     for i in range(q):
         predicted = expected = known[i]
         spread = 0.0

@@ -1,7 +1,13 @@
-"""The constrained Kalman filter, one equation after the other.
+"""The constrained Kalman filter, one equation after the other, its covariance in factors (`factors.py`).
 
 The errors of the equations are independent (R2 is diagonal), so their updates may be made in turn, each with
 a scalar instead of a matrix to invert:  s = psi P psi' + r,  L = P psi' / s,  P = (I - L psi) P (I - L psi)' + L r L'.
+
+A parameter that is held has left psi, and its row of L is 0. With L = K - H, K the gain of all and H its held rows, that is
+
+    P = P - s K K' + s H H'
+
+the update of all, which factors take, and a square added for those that are held (Zanetti and D'Souza 2012, AAS 12-619).
 """
 
 import numpy as np
@@ -9,27 +15,29 @@ from numba import njit
 
 from ..estimators.kalman import SMALLEST_SHARE
 from ..kinematics import FEWEST, RECORD
+from ..regression import QUIETEST
+from .factors import add_square, observe, product_of, seen_through, widen
 
 
 @njit(cache=True)
-def kalman_update(theta, covariance, noise, gradient, target, active, lower, upper, constrained, clamped):
-    """Update theta (p,) and its covariance (p, p) in place by one sample of q equations.
+def kalman_update(theta, factors, noise, gradient, target, active, lower, upper, constrained, clamped):
+    """Update theta (p,) and its covariance's factors (p, p) in place by one sample of q equations.
 
     noise (q,) variances; gradient (q, p); target (q,) measured minus known, NaN where not measured; active (p,) 1.0 where
     estimated; lower, upper: bounds of the first of them; clamped (p,) is set to 1.0 where one is held at its bound.
     """
     start = theta.copy()
-    prior = covariance.copy()
+    prior = factors.copy()
     free = active.copy()
     clamped[:] = 0.0
-    gain = np.zeros(len(covariance))
-    spread = np.empty(len(covariance))
+    psi = np.empty(len(theta))
+    spread = np.empty(len(theta))
     while True:
         theta[:] = start
-        covariance[:] = prior
+        factors[:] = prior
         for i in range(len(target)):
             if target[i] == target[i]:
-                _one_equation(theta, covariance, noise[i], gradient[i], target[i], free, gain, spread)
+                _one_equation(theta, factors, noise[i], gradient[i], target[i], free, psi, spread)
         again = False
         if constrained:
             for j in range(len(lower)):
@@ -43,63 +51,48 @@ def kalman_update(theta, covariance, noise, gradient, target, active, lower, upp
 
 
 @njit(cache=True, inline="always")
-def _one_equation(theta, covariance, r, psi, target, free, gain, spread):
-    n = len(theta)
-    error, s = target, r
-    for j in range(n):
-        total = 0.0
-        for k in range(n):
-            if free[k] == 1.0:
-                total += covariance[j, k] * psi[k]
-        spread[j] = total
-    for j in range(n):
+def _one_equation(theta, factors, r, gradient, target, free, psi, spread):
+    """spread: first P psi', then of that only what is held."""
+    error, last = target, -1
+    for j in range(len(theta)):
+        error -= gradient[j] * theta[j]
+        psi[j] = free[j] * gradient[j]
+    s = observe(factors, psi, r, spread)
+    if s == 0.0:  # neither noise nor anything to learn
+        return
+    for j in range(len(theta)):
         if free[j] == 1.0:
-            s += psi[j] * spread[j]
-    for j in range(n):
-        error -= psi[j] * theta[j]
-    for j in range(n):
-        gain[j] = free[j] * spread[j] / s
-        theta[j] += gain[j] * error
-    # Joseph's form for one equation: T = (I - L psi) P, then T (I - L psi)' + L r L', with psi P = spread'
-    for j in range(n):
-        remaining = spread[j] - gain[j] * (s - r)
-        for k in range(j + 1):
-            value = covariance[j, k] - gain[j] * spread[k] - remaining * gain[k] + r * gain[j] * gain[k]
-            covariance[j, k] = value
-            covariance[k, j] = value
+            theta[j] += spread[j] / s * error
+            spread[j] = 0.0
+        elif spread[j] != 0.0:
+            last = j
+    add_square(factors, 1.0 / s, spread, last)
 
 
 @njit(cache=True, inline="always")
 def kalman_step(plan, method, n, s, row, dt, known, gradient, active, walk, learnt, target, clamped):
     """Random walk, update, and adaptation of R2 to what the model cannot follow."""
     p, q = len(s.theta), len(known)
-    spread = np.empty(len(s.covariance))
+    unit, through = np.empty(p), np.empty((q, p))
     for j in range(n.estimated):
         size = max(abs(s.theta[j]), SMALLEST_SHARE * plan.scale[j])
-        s.covariance[j, j] += walk[j] * size**2
+        if walk[j] > 0.0:
+            widen(s.factors, walk[j] * size**2, j, unit)
     if n.offsets and np.isnan(s.noise[0]):
         count = s.count.max()
         for b in range(n.offsets):
             variance = s.squares[b] / count * (1.0 / count + dt / RECORD) if count >= FEWEST else 0.0
-            s.covariance[n.estimated + b, n.estimated + b] = variance
+            s.factors[n.estimated + b, n.estimated + b] = variance
     for i in range(q):
         if np.isnan(s.noise[i]):
             s.noise[i] = learnt[i] if learnt[i] == learnt[i] else 1.0
         target[i] = row.measured[i] - known[i]
-    for i in range(q):
-        for j in range(len(spread)):
-            spread[j] = 0.0
-            for h in range(len(spread)):
-                spread[j] += s.covariance[j, h] * gradient[i, h]
-        for k in range(q):
-            total = s.noise[i] if i == k else 0.0
-            for j in range(len(spread)):
-                total += gradient[k, j] * spread[j]
-            row.innovation_covariance[k, i] = total
+    seen_through(s.factors, gradient, s.noise, through, row.innovation_covariance)
     before = s.theta.copy()
     kalman_update(
-        s.theta, s.covariance, s.noise, gradient, target, active, plan.lower, plan.upper, method.constrained, clamped
+        s.theta, s.factors, s.noise, gradient, target, active, plan.lower, plan.upper, method.constrained, clamped
     )
+    product_of(s.factors, s.covariance)
     if method.noise_memory > 0.0:
         share = dt / (dt + method.noise_memory)
         for i in range(q):
@@ -110,5 +103,4 @@ def kalman_step(plan, method, n, s, row, dt, known, gradient, active, walk, lear
             product = residual * innovation
             if product == product:
                 s.noise[i] += share * (max(product, 0.0) - s.noise[i])
-            if learnt[i] == learnt[i]:
-                s.noise[i] = max(s.noise[i], learnt[i])
+            s.noise[i] = max(s.noise[i], learnt[i] if learnt[i] == learnt[i] else QUIETEST**2)

@@ -40,7 +40,8 @@ def state_fields(size: Size) -> dict[str, tuple[int, ...]]:
         "peak_rate": (e,),
         "contact": (e,),  # ElementState
         "theta": (p + n,),  # the estimated parameters only, here and below, and the errors of the zero offsets
-        "covariance": (p + n, p + n),
+        "covariance": (p, p),
+        "factors": (p + n, p + n),  # of the Kalman filter's covariance, see factors.py
         "noise": (q,),  # R2 of the Kalman filter, slow residual variance of RLS; NaN until the first update
         "information": (p, p),  # RLS from here on
         "carried": (p, p),

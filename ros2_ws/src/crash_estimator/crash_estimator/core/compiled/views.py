@@ -25,6 +25,7 @@ class StateViews(NamedTuple):
     contact: np.ndarray
     theta: np.ndarray
     covariance: np.ndarray
+    factors: np.ndarray
     noise: np.ndarray
     information: np.ndarray
     carried: np.ndarray
@@ -79,7 +80,7 @@ def state_views(s, n):
     p = n.estimated
     w = n.estimated + n.offsets
     k = cuts((
-        2, c, c, b, q, b, b, b, e, e, e, e, e, w, w * w, q, p * p, p * p, q * q, 1,
+        2, c, c, b, q, b, b, b, e, e, e, e, e, w, p * p, w * w, q, p * p, p * p, q * q, 1,
         m * q * p, m * q, m * q, m * p, m, m * q, m * p * q, m * q,
     ))  # fmt: skip
     return StateViews(
@@ -97,20 +98,21 @@ def state_views(s, n):
         s[k[11] : k[12]],  # peak_rate
         s[k[12] : k[13]],  # contact
         s[k[13] : k[14]],  # theta
-        s[k[14] : k[15]].reshape((w, w)),  # covariance
-        s[k[15] : k[16]],  # noise
-        s[k[16] : k[17]].reshape((p, p)),  # information
-        s[k[17] : k[18]].reshape((p, p)),  # carried
-        s[k[18] : k[19]].reshape((q, q)),  # error_covariance
-        s[k[19] : k[20]],  # gamma
-        s[k[20] : k[21]].reshape((m, q, p)),  # window_gradient
-        s[k[21] : k[22]].reshape((m, q)),  # window_target
-        s[k[22] : k[23]].reshape((m, q)),  # window_noise
-        s[k[23] : k[24]].reshape((m, p)),  # window_active
-        s[k[24] : k[25]],  # window_dt
-        s[k[25] : k[26]].reshape((m, q)),  # window_error
-        s[k[26] : k[27]].reshape((m, p, q)),  # window_influence
-        s[k[27] : k[28]].reshape((m, q)),  # window_variance
+        s[k[14] : k[15]].reshape((p, p)),  # covariance
+        s[k[15] : k[16]].reshape((w, w)),  # factors
+        s[k[16] : k[17]],  # noise
+        s[k[17] : k[18]].reshape((p, p)),  # information
+        s[k[18] : k[19]].reshape((p, p)),  # carried
+        s[k[19] : k[20]].reshape((q, q)),  # error_covariance
+        s[k[20] : k[21]],  # gamma
+        s[k[21] : k[22]].reshape((m, q, p)),  # window_gradient
+        s[k[22] : k[23]].reshape((m, q)),  # window_target
+        s[k[23] : k[24]].reshape((m, q)),  # window_noise
+        s[k[24] : k[25]].reshape((m, p)),  # window_active
+        s[k[25] : k[26]],  # window_dt
+        s[k[26] : k[27]].reshape((m, q)),  # window_error
+        s[k[27] : k[28]].reshape((m, p, q)),  # window_influence
+        s[k[28] : k[29]].reshape((m, q)),  # window_variance
     )
 
 

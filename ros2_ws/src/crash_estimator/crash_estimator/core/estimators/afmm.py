@@ -131,7 +131,7 @@ class Afmm:
         best = _likeliest(models)
         kept = sorted(models, key=lambda model: -model.log_weight)[: self.models - 1]
         variance = np.where(self.settings.std > 0.0, self.jump * self.settings.scale, 0.0) ** 2
-        jumped = best.filter._replace(covariance=best.filter.covariance + np.diag(variance))
+        jumped = best.filter.widened(variance)
         branch = Model(jumped, best.log_weight + np.log(self.probability), time, best.update, best.products)
         kept[0] = best._replace(log_weight=best.log_weight + np.log1p(-self.probability))
         return (*kept, branch)

@@ -3,10 +3,17 @@
     theta_t = theta_{t-1} + w,  w ~ (0, R1)          y_t = Psi_t theta_t + e,  e ~ (0, R2)
     L = P Psi' (R2 + Psi P Psi')^-1,   theta += L (y - Psi theta),   P = (I - L Psi) P (I - L Psi)' + L R2 L'
 
+P is kept as a root, P = S S', which stays positive whatever is rounded (Potter 1963; Bierman 1977, chapter V): a sum of
+products is that of columns beside one another, and turned into as few columns as rows by an orthogonal transformation,
+
+    P + diag(q) = [S, diag(q)^1/2] [..]'         (I - L Psi) P (I - L Psi)' + L R2 L' = [(I - L Psi) S, L R2^1/2] [..]'
+
 The process noise R1 follows the crush, because stiffness is a function of crush: the variance grows by
 (drift theta)^2 for each e-fold of crush, and not at all while nothing moves. R2 starts from the noise
 before the impact (or the model's `noise`) and adapts:  E[residual innovation] = R2  holds for any gain that
-is optimal, so its running mean over `noise_memory` estimates what the model cannot follow as well.
+is optimal, so its running mean over `noise_memory` estimates what the model cannot follow as well. It does not fall below
+the noise before the impact, or where that is not known below QUIETEST: a stiffness that drifts as fast as the samples come
+follows each of them exactly, and then R2 would shrink to the rounding of the measurement.
 
 Crush is integrated twice from accelerations whose zero is known no better than the mean of n noisy samples, so
 that a stiff element's force is wrong by K b t^2 / 2. With `offsets` these errors b, one for each measured body, are
@@ -23,7 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..regression import Regression
+from ..regression import QUIETEST, Regression
 from .update import Theta, Update, within_bounds
 
 SMALLEST_SHARE = 0.05
@@ -32,9 +39,18 @@ SMALLEST_SHARE = 0.05
 
 class KalmanState(NamedTuple):
     theta: np.ndarray  # (p,)
-    covariance: np.ndarray  # (p, p), or (p + b, p + b) once the offsets' errors have joined
+    root: np.ndarray  # (p, p) of the covariance, or (p + b, p + b) once the offsets' errors have joined
     offsets: np.ndarray  # (b,) m/s^2, the zero offsets' errors; empty until they have joined
     noise: np.ndarray  # (q,) variance of each equation's error, R2; NaN until the first update
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(p, p) of theta."""
+        return covariance_of(self.root[: len(self.theta)])
+
+    def widened(self, variance: np.ndarray) -> "KalmanState":
+        """With the variance (p,) of a jump added."""
+        return self._replace(root=narrowed(np.hstack([self.root, np.diag(np.sqrt(variance))])))
 
 
 @dataclass(frozen=True)
@@ -47,52 +63,50 @@ class Kalman:
     offsets: bool = True  # estimate the errors of the zero offsets with theta
 
     def init(self, equations: int) -> KalmanState:
-        return KalmanState(
-            self.settings.initial, np.diag(self.settings.std**2), np.zeros(0), np.full(equations, np.nan)
-        )
+        return KalmanState(self.settings.initial, np.diag(self.settings.std), np.zeros(0), np.full(equations, np.nan))
 
     def update(self, state: KalmanState, regression: Regression) -> tuple[KalmanState, Update]:
         theta, noise, p = state.theta, self._noise(state, regression), len(state.theta)
-        covariance, gradient, offsets = state.covariance, regression.gradient, state.offsets
+        root, gradient, offsets = state.root, regression.gradient, state.offsets
         if self.offsets:
-            if len(covariance) == p:
-                covariance = _with_offsets(covariance, regression.offset_variance)
-                offsets = np.zeros(len(covariance) - p)
+            if len(root) == p:
+                root = _with_offsets(root, regression.offset_variance)
+                offsets = np.zeros(len(root) - p)
             gradient = np.hstack([gradient, regression.offset_gradient])
         always = np.ones(len(offsets), dtype=bool)
-        prior = covariance + np.diag(self._walk(theta, regression, len(offsets)))
+        prior = np.hstack([root, self._walk(theta, regression, len(offsets))])
         target = regression.measured - regression.known
         equations = [(psi, y, r) for psi, y, r in zip(gradient, target, noise) if not np.isnan(y)]
 
         def assimilate(theta: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             """The equations' errors are independent, so they update in turn, each with a scalar to divide by."""
-            covariance, both = prior, np.concatenate([theta, offsets])
+            root, both = prior, np.concatenate([theta, offsets])
             moved = np.concatenate([free, always])
             for psi_all, y, r in equations:
-                psi = np.where(moved, psi_all, 0.0)
-                spread = covariance @ psi
-                gain = np.where(moved, spread / (r + psi @ spread), 0.0)
+                seen = np.where(moved, psi_all, 0.0) @ root  # psi S
+                gain = np.where(moved, root @ seen / (r + seen @ seen), 0.0)
                 both = both + gain * (y - psi_all @ both)
-                lessen = np.eye(len(prior)) - np.outer(gain, psi)
-                covariance = lessen @ covariance @ lessen.T + r * np.outer(gain, gain)
-            return both, 0.5 * (covariance + covariance.T)
+                root = np.column_stack([root - np.outer(gain, seen), gain * np.sqrt(r)])
+            return both, root
 
         bounds = self.settings if self.constrained else self.settings._replace(lower=-np.inf, upper=np.inf)
         updated, clamped = within_bounds(lambda t, free: assimilate(t, free)[0][:p], theta, regression.active, bounds)
         held = np.where(clamped, updated, theta)
-        both, covariance = assimilate(held, regression.active & ~clamped)
-        innovation_covariance = np.diag(noise) + gradient @ prior @ gradient.T
+        both, root = assimilate(held, regression.active & ~clamped)
+        innovation_covariance = np.diag(noise) + covariance_of(gradient @ prior)
         expected, expected_after = gradient[:, p:] @ offsets, gradient[:, p:] @ both[p:]
         residual = target - regression.gradient @ updated - expected_after
         products = residual * (target - regression.gradient @ theta - expected)
-        state = KalmanState(updated, covariance, both[p:], self._adapt(noise, products, regression))
+        state = KalmanState(updated, narrowed(root), both[p:], self._adapt(noise, products, regression))
         return state, Update(
-            updated, covariance[:p, :p], innovation_covariance, clamped, expected_error=(expected, expected_after)
+            updated, state.covariance, innovation_covariance, clamped, expected_error=(expected, expected_after)
         )
 
     def _walk(self, theta: np.ndarray, regression: Regression, extra: int) -> np.ndarray:
+        """Root of R1: a column for each parameter that walks."""
         size = np.maximum(np.abs(theta), SMALLEST_SHARE * self.settings.scale)
-        return np.concatenate([regression.walk * size**2, np.zeros(extra)])
+        std = np.concatenate([np.sqrt(regression.walk) * size, np.zeros(extra)])
+        return np.diag(std)[:, std > 0.0]
 
     def _noise(self, state: KalmanState, regression: Regression) -> np.ndarray:
         return np.where(np.isnan(state.noise), np.nan_to_num(regression.noise, nan=1.0), state.noise)
@@ -102,12 +116,23 @@ class Kalman:
             return noise
         share = regression.dt / (regression.dt + self.noise_memory)
         adapted = noise + share * (np.where(np.isnan(products), noise, np.maximum(products, 0.0)) - noise)
-        return np.fmax(adapted, regression.noise)
+        return np.maximum(adapted, np.nan_to_num(regression.noise, nan=QUIETEST**2))
 
 
-def _with_offsets(covariance: np.ndarray, variance: np.ndarray) -> np.ndarray:
+def _with_offsets(root: np.ndarray, variance: np.ndarray) -> np.ndarray:
     """Append the offsets' errors (b,), each with the variance learnt before the impact."""
-    p = len(covariance)
-    grown = np.diag(np.concatenate([np.zeros(p), variance]))
-    grown[:p, :p] = covariance
+    p = len(root)
+    grown = np.diag(np.concatenate([np.zeros(p), np.sqrt(variance)]))
+    grown[:p, :p] = root
     return grown
+
+
+def covariance_of(root: np.ndarray) -> np.ndarray:
+    """S (p, n) -> S S' (p, p)."""
+    covariance = root @ root.T
+    return 0.5 * (covariance + covariance.T)
+
+
+def narrowed(root: np.ndarray) -> np.ndarray:
+    """S (p, n) -> a triangular root (p, p) of the same S S', n >= p."""
+    return np.linalg.qr(root.T, mode="r").T
