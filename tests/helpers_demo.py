@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from ament_index_python.packages import get_package_prefix
 from helpers_domain import own_domain
+from helpers_paths import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 BAG = ROOT / "bags/frontal_engine_cab.mcap"
 PATIENCE = 240.0
 """s for a whole demonstration, on a machine with other work."""

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_prefix
 from helpers_domain import own_domain
+from helpers_paths import BAGS
 from helpers_waiting import PATIENCE
 
-BAG = Path(__file__).resolve().parent.parent / "bags" / "frontal_single.mcap"
+BAG = BAGS / "frontal_single.mcap"
 MODEL = "model:=frontal_single"
 MODULES = {
     "replay": "crash_replay.replay_node",

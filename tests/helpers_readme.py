@@ -2,12 +2,11 @@
 
 import os
 import re
-from pathlib import Path
 
 import pytest
 from helpers_domain import own_domain
+from helpers_paths import ROOT
 
-ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
 COMMANDS = [line for block in re.findall(r"```sh\n(.*?)```", README, re.S) for line in block.splitlines() if line]
 

@@ -8,8 +8,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from helpers_paths import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 ROS_IS_INSTALLED = shutil.which("ros2") is not None or Path("/opt/ros/jazzy").exists()
 wheels_only = pytest.mark.skipif(ROS_IS_INSTALLED, reason="here the installed ROS 2 Jazzy is used, not the wheels")
 

@@ -1,7 +1,6 @@
 """Simulated recordings that several tests look at, each made once, and the command that makes them."""
 
 from functools import cache
-from pathlib import Path
 
 from ruamel.yaml import YAML
 
@@ -9,7 +8,6 @@ from crash_replay.synthesize_command import main
 from crash_replay.synthetic.hidden.cases import HiddenCase, draw_case
 from crash_replay.synthetic.recordings import SCENARIOS
 
-BAGS = Path(__file__).parents[1] / "bags"
 SEED = 11
 
 ideal = cache(lambda name: SCENARIOS[name](ideal=True))

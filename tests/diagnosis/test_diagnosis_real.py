@@ -1,0 +1,62 @@
+"""Recordings of hardware: a programmed damper is found and sized, none where there is none, and an engine is named."""
+
+import re
+from pathlib import Path
+
+import pytest
+from helpers_paths import DATA
+
+from crash_estimator.core.diagnosis.online.online_answer import final_answer
+from crash_estimator.core.diagnosis.report.diagnosis import diagnose
+from crash_estimator.model_file import load_model
+from crash_replay.readers import read_source
+
+CYBERDIVER, NHTSA = DATA / "cyberdiver", DATA / "nhtsa-10146"
+DAMPERS = {"viscous_damping", "quadratic_damping", "coulomb_friction", "rate_hardening"}
+PROGRAMMED = {"025": 23.4, "05": 46.8}
+"""N s/m, by the damping ratio in the file's name (the recordings' README)."""
+
+cyberdiver = pytest.mark.skipif(not CYBERDIVER.is_dir(), reason=f"no recordings in {DATA}")
+nhtsa = pytest.mark.skipif(not NHTSA.is_dir(), reason=f"no recordings in {DATA}")
+
+
+def programmed(path: Path) -> float:
+    """N s/m."""
+    return PROGRAMMED[re.search(r"_(\d+)damping", path.name).group(1)]
+
+
+DAMPED = [CYBERDIVER / f"linear_damped__15npmm_{name}damping_trial1.csv" for name in ("4mps_025", "6mps_05")]
+"""Both speeds and both dampers."""
+
+SPRINGS = ("5npmm_6mps", "15npmm_2mps", "15npmm_6mps", "45npmm_4mps")
+UNDAMPED = [CYBERDIVER / f"linear_undamped__{spring}_trial1.csv" for spring in SPRINGS]
+"""Of each spring the fastest, and the weakest impact; the other seven take as long again and end alike."""
+
+
+@cyberdiver
+@pytest.mark.parametrize("path", DAMPED, ids=lambda path: path.stem)
+def test_the_programmed_damper_is_found(path):
+    first = diagnose(load_model("impactor_spring"), [read_source(path)]).steps[0]
+    assert (first.effect, first.target) == ("viscous_damping", "spring")
+    assert first.coefficient == pytest.approx(programmed(path), rel=0.15)
+
+
+@cyberdiver
+@pytest.mark.parametrize("path", UNDAMPED, ids=lambda path: path.stem)
+def test_no_damping_is_proposed_where_there_is_none(path):
+    found = diagnose(load_model("impactor_spring"), [read_source(path)])
+    assert not DAMPERS & {step.effect for step in found.steps}
+    assert found.ranking[0].effect not in DAMPERS
+
+
+@nhtsa
+def test_the_engine_is_named_that_a_one_mass_car_lacks():
+    """The engine's 400 kg; its inertia with the car's explains the barrier force that the car's alone does not."""
+    found = diagnose(load_model("frontal_single"), [read_source(NHTSA)])
+    first = found.steps[0]
+    assert (first.effect, first.target) == ("unmodelled_body", "engine_ax")
+    assert first.coefficient == pytest.approx(400.0, rel=0.15)
+    share = first.force_explained["barrier_fx"]
+    assert share["before"] < 0.15 and share["after"] > 0.8
+    answer = final_answer(found)
+    assert (answer.force, answer.force_explained) == ("barrier_fx", (share["before"], share["after"]))

@@ -1,0 +1,292 @@
+"""NHTSA EV5 folders: test 10146 gives the figures of its README; a small folder written here has every trap."""
+
+import numpy as np
+import pytest
+from helpers_paths import DATA
+from numpy.testing import assert_allclose, assert_array_equal
+
+from crash_replay.bag import read_bag, write_bag
+from crash_replay.conditioning import cfc_filter, integrate, remove_offset
+from crash_replay.readers import read_source
+from crash_replay.readers.ev5 import Curve
+from crash_replay.readers.nhtsa_names import channel_names
+from crash_replay.recording import RecordingError
+
+G = 9.80665
+NHTSA = DATA / "nhtsa-10146"
+BODY = ["left_rear_crossmember_ax", "right_rear_crossmember_ax"]
+BODY += [f"{name}_redundant" for name in BODY]
+real_data = pytest.mark.skipif(not NHTSA.is_dir(), reason=f"no recordings in {DATA}")
+
+
+# ---- the real one
+
+
+@pytest.fixture(scope="module")
+def camry():
+    return read_source(NHTSA)
+
+
+def at(recording, time):
+    return int(np.searchsorted(recording.time_ns, round(time * 1e9)))
+
+
+@real_data
+@pytest.mark.parametrize("prepare", [lambda r: r, remove_offset], ids=["as recorded", "offset removed"])
+def test_body_motion(camry, prepare):
+    """Integrated from 57.09 km/h at time zero, unfiltered; the offset (0.01 g) makes 0.07 % of difference."""
+    recording = prepare(camry)
+    single = [3.6 * integrate(recording.time, recording.column(name))[0][at(recording, 0.150)] for name in BODY]
+    assert_allclose([min(single), max(single)], [-66.1, -64.5], atol=0.05)  # km/h
+    assert_allclose(np.mean(single), -65.4, rtol=0.005)
+    mean = np.mean([recording.column(name) for name in BODY], axis=0)
+    v, x = integrate(recording.time, mean, recording.test.initial_velocity["car"])
+    stop = int(np.argmax(v < 0))
+    fraction = v[stop - 1] / (v[stop - 1] - v[stop])
+    assert_allclose(recording.time[stop - 1] + fraction * recording.sample_period, 0.0735, atol=0.0005)
+    assert_allclose(x.max(), 0.741, rtol=0.01)
+
+
+@real_data
+def test_filtered_peaks(camry):
+    def filtered(values):
+        return cfc_filter(values, camry.sample_period, 60)
+
+    body = filtered(np.mean([camry.column(name) for name in BODY], axis=0)) / G
+    assert_allclose(body.min(), -41.7, rtol=0.01)
+    assert_allclose(camry.time[body.argmin()], 0.064, atol=0.0005)
+    engine = filtered(camry.column("engine_top_ax")) / G
+    assert_allclose(engine.min(), -106.9, rtol=0.01)
+    assert_allclose(camry.time[engine.argmin()], 0.029, atol=0.0005)
+    barrier = camry.column("barrier_fx")
+    assert_allclose(barrier.max(), 731e3, rtol=0.001)
+    assert_allclose(filtered(barrier).max(), 678e3, rtol=0.01)
+    assert_allclose(camry.time[filtered(barrier).argmax()], 0.035, atol=0.0005)
+
+
+@real_data
+def test_names_bodies_and_means(camry):
+    bodies = {channel.name: channel.body for channel in camry.test.channels}
+    assert {name for name, body in bodies.items() if body == "car"} == {"car_ax", *BODY}
+    assert {name for name, body in bodies.items() if body == "engine"} == {
+        "engine_ax",
+        "engine_top_ax",
+        "engine_bottom_ax",
+    }
+    for name in ("driver_head_ax", "driver_head_ay", "driver_head_az", "driver_chest_ax", "driver_pelvis_ax"):
+        assert bodies[name] == name.removesuffix(name[-3:])
+    assert len(bodies) == 16
+    assert_allclose(camry.column("car_ax"), np.mean([camry.column(name) for name in BODY], axis=0))
+    assert_array_equal(camry.column("engine_ax"), camry.column("engine_top_ax"))
+    assert set(camry.test.initial_velocity) == {"car", "engine", "driver_head", "driver_chest", "driver_pelvis"}
+    assert_allclose(list(camry.test.initial_velocity.values()), 57.09 / 3.6)
+
+
+@real_data
+def test_traps(camry):
+    assert len(camry) == 3500 and (camry.time_ns[0], camry.time_ns[-1]) == (-50_000_000, 299_900_000)
+    bottom = camry.column("engine_bottom_ax")
+    assert np.isfinite(bottom[:1170]).all() and np.isnan(bottom[1170:]).all()
+    assert [c.name for c, v in zip(camry.test.channels, camry.values.T) if not np.isfinite(v).all()] == [
+        "engine_bottom_ax"
+    ]
+    notes = "\n".join(camry.test.notes)
+    assert "sum of 174 of 176 cells, without BARRIER F-01 Fx (curve 347), BARRIER C-04 Fx (curve 500);" in notes
+    assert "positive in compression: sign turned" in notes
+    assert "engine_bottom_ax: valid from -0.0500 s to 0.0669 s only, NaN elsewhere" in notes
+    assert "no data file: curves 4-12, 16-19, 21-44, 47-90, 97-98, 101-106 and 348 barrier cell moments" in notes
+    assert "sensor not fitted: curves 45-46, 91-92" in notes
+    assert "closing speed 57.09 km/h, test mass 1719 kg" in notes
+    assert max(map(len, camry.test.notes)) < 300
+
+
+@real_data
+def test_cells_are_kept_when_asked_for_and_add_up(camry):
+    with_cells = read_source(NHTSA, cells=True)
+    cells = [k for k, c in enumerate(with_cells.test.channels) if c.body == "barrier" and c.name != "barrier_fx"]
+    assert len(cells) == 174 and with_cells.test.channels[cells[0]].name == "barrier_k01_fx"
+    assert_allclose(with_cells.values[:, cells].sum(axis=1), camry.column("barrier_fx"), atol=1e-6)
+
+
+@real_data
+def test_bag_of_it_is_the_same(camry, tmp_path):
+    read = read_bag(write_bag(camry, tmp_path / "camry"))
+    assert_array_equal(read.values, camry.values)
+    assert_array_equal(read.time_ns, camry.time_ns)
+    assert read.test.channels == camry.test.channels and read.test.notes == camry.test.notes
+    assert read.test.initial_velocity == camry.test.initial_velocity
+
+
+# ---- names
+
+
+def curve(comment, sensor="AC", occupant="NA", location="XXXX", axis="XG", unit="G'S", vehicle=1, **others):
+    fields = dict.fromkeys(Curve._fields, "") | {"first": -2, "last": 2, "step": 100.0, "initial_velocity": 36.0}
+    fields |= {"number": 1, "time_unit": "SEC", "status": "AM", "redundancy": "P", "prefilter": "2800"}
+    fields |= {"comment": comment, "sensor": sensor, "occupant": occupant, "location": location, "axis": axis}
+    return Curve(**fields | {"unit": unit, "vehicle": vehicle} | others)
+
+
+@pytest.mark.parametrize(
+    "given, name",
+    [
+        (curve("DRIVER HEAD X", occupant="01", axis="XL"), "driver_head_ax"),
+        (curve("HEAD CG Z", occupant="02", axis="ZL"), "passenger_head_cg_az"),
+        (curve("TOP OF ENGINE X"), "engine_top_ax"),
+        (curve("LEFT REAR SEAT CROSSMEMBER XR", redundancy="R"), "left_rear_crossmember_ax_redundant"),
+        (
+            curve("DRIVER RIGHT FEMUR RED.", "LC", "01", axis="ZL", unit="NWT", redundancy="R"),
+            "driver_right_femur_fz_redundant",
+        ),
+        (curve("DRIVER LEFT UPPER TIBIA MY", "LC", "01", axis="YL", unit="NWM"), "driver_left_upper_tibia_my"),
+        (curve("DRIVER HEAD ANGULAR VELOCITY X", "AV", "01", unit="DPS"), "driver_head_wx"),
+        (curve("DRIVER CHEST DISPLACEMENT", "DS", "01", axis="XL", unit="MM"), "driver_chest_dx"),
+        (curve("DRIVER LEFT FOOT Z - FRONT", occupant="01", axis="ZL"), "driver_left_foot_front_az"),
+        (curve("BARRIER K-01 Fx", "LC", location="LC1101", unit="NWT", vehicle=0), "barrier_k01_fx"),
+        (curve("BOTTOM OF ENGINE X: No valid data after 67ms"), "engine_bottom_ax"),
+        (curve("", location="VECG", axis="NA"), "vecg_a"),
+        (curve("3RD ROW X"), "xxxx_3rd_row_ax"),
+    ],
+)
+def test_names(given, name):
+    assert channel_names([given], vehicles=1) == [name]
+
+
+def test_names_are_unique_and_tell_vehicles_apart():
+    assert channel_names([curve("SILL X")] * 3, 1) == ["sill_ax", "sill_ax_2", "sill_ax_3"]
+    assert channel_names([curve("SILL X"), curve("SILL X", vehicle=2)], 2) == ["vehicle1_sill_ax", "vehicle2_sill_ax"]
+
+
+# ---- a small folder
+
+
+def record(number, comment, values=None, sensor="AC", **fields):
+    return curve(comment, sensor, number=number, **fields), values
+
+
+SENSORS = [
+    record(1, "DRIVER HEAD X", [0, 0, 0, -1, -2], occupant="01", axis="XL"),
+    record(2, "FLOOR LEFT X", [0, 0, 1, -1, -2], location="FLLR"),
+    record(3, "FLOOR RIGHT X", [0, 0, 3, -1, -4], location="FLRR"),
+    record(4, "TOP OF ENGINE X: No valid data after 0.1 ms", [0, 0, 5, 6, 7], location="ENGN", status="CF"),
+    record(5, "FENDER X: No valid data", [0, 0, 5, 6, 7], status="CF"),
+    record(6, "BELT: Not installed", None, "SG", unit="NWT", status="NO"),
+    record(7, "SILL TEMPERATURE", [1, 1, 1, 1, 1], "TC", unit="DGC"),
+    record(8, "SILL X"),
+    record(9, "SLOW X", [0, 1], step=500.0),
+    record(20, "BARRIER A-01 Fx", [0, 0, -10, -20, -5], "LC", unit="NWT", vehicle=0),
+    record(21, "BARRIER A-02 Fx", [0, 0, -1, 2, -5], "LC", unit="NWT", vehicle=0),
+    record(22, "BARRIER A-02 Mz", [9, 9, 9, 9, 9], "LC", unit="NWM", vehicle=0),
+    record(23, "BARRIER A-03 Fx: No valid data", [9, 9, 9, 9, 9], "LC", unit="NWT", vehicle=0, status="CF"),
+    record(24, "BARRIER A-04 Fx", [0, 0, -1], "LC", unit="NWT", vehicle=0),
+    record(25, "BARRIER A-05 Fx", None, "LC", unit="NWT", vehicle=0),
+]
+
+
+def write_folder(folder, sensors=SENSORS):
+    test = "V5|A CAR|FRONT|03/OCT/2017|LAB|C|R|NCA|VTB|CON|DRY|22|OTH|OTH|36.0|0|0|0|9|DAS"
+    lines = ["# Source: NHTSA Vehicle Database - Test Number: 99", "----- EV5 -----", "----- TEST -----", test]
+    lines += ["----- VEHICLE -----", "1|16|03|2018|M|4S|V|4CIF|2.5|AF|1500|1"]
+    lines += ["----- INSTRUMENTATION -----"]
+    for made, values in sensors:
+        lines.append("|".join(f"{field:g}" if isinstance(field, float) else str(field) for field in made))
+        if values is not None:
+            rows = (f"{(k - 2) * made.step * 1e-6:.6f}\t{value:.6f}\n" for k, value in enumerate(values))
+            (folder / f"v99.{made.number:03d}").write_text("".join(rows))
+    (folder / "v99.EV5").write_text("\r\n".join([*lines, "----- END -----"]))
+    return folder
+
+
+def test_small_folder_with_every_trap(tmp_path):
+    recording = read_source(write_folder(tmp_path))
+    assert_array_equal(recording.time_ns, np.arange(-2, 3) * 100_000)
+    assert recording.test.channel_names == (
+        "car_ax", "barrier_fx", "driver_head_ax", "floor_left_ax", "floor_right_ax", "engine_top_ax"
+    )  # fmt: skip
+    assert_allclose(recording.column("car_ax"), np.array([0, 0, 2, -1, -3]) * G)
+    assert_allclose(recording.column("barrier_fx"), [0, 0, 11, 18, 10])
+    assert_allclose(recording.column("engine_top_ax"), np.array([0, 0, 5, np.nan, np.nan]) * G)
+    assert recording.test.initial_velocity == {"driver_head": 10.0, "car": 10.0, "engine": 10.0}
+    assert recording.test.notes == (
+        "closing speed 36 km/h, test mass 1500 kg",
+        "car_ax: mean of floor_left_ax, floor_right_ax",
+        "barrier_fx: sum of 2 of 5 cells, without BARRIER A-03 Fx (curve 23), BARRIER A-04 Fx (curve 24), "
+        "BARRIER A-05 Fx (curve 25); the cells themselves (4 curves) are left out; "
+        "positive in compression: sign turned, the cells read negative in compression",
+        "engine_top_ax: valid from -0.0002 s to 0.0000 s only, NaN elsewhere",
+        "left out, no valid data, says the header: curves 5, 23",
+        "left out, sensor not fitted: curves 6",
+        "left out, unit DGC has no ROS message: curves 7",
+        "left out, no data file: curves 8, 25",
+        "left out, sampled at another rate than 10000 Hz: curves 9",
+    )
+
+
+def test_cells_that_read_positive_stay_positive(tmp_path):
+    cells = [record(20, "BARRIER A-01 Fx", [0, 0, 10, 20, -5], "LC", unit="NWT", vehicle=0)]
+    recording = read_source(write_folder(tmp_path, cells))
+    assert_allclose(recording.column("barrier_fx"), [0, 0, 10, 20, -5])
+    assert "positive in compression: sign as recorded" in recording.test.notes[1]
+
+
+def test_a_damaged_curve_costs_only_itself(tmp_path):
+    folder = write_folder(tmp_path)
+    (folder / "v99.001").write_text("0.0\tabc\n")
+    (folder / "v99.002").write_text("0.0 1.0 2.0\n")
+    (folder / "v99.003").write_text("-0.0002\t1\n-0.0001\t1\n0.00015\t1\n")
+    recording = read_source(folder)
+    assert recording.test.channel_names == ("barrier_fx", "engine_top_ax")
+    notes = "\n".join(recording.test.notes)
+    assert "left out, v99.001 is damaged (" in notes
+    assert "left out, v99.002: expected the two columns time and value: curves 2" in notes
+    assert "left out, v99.003: its times are not the header's steps of 100 us: curves 3" in notes
+
+
+def test_names_file_in_the_folder_renames(tmp_path):
+    folder = write_folder(tmp_path)
+    (folder / "import.yaml").write_text("channels: {car_ax: {name: cab_ax, body: cab}}\ninitial_velocity: {cab: 9.0}\n")
+    recording = read_source(folder)
+    assert recording.test.channels[0].name == "cab_ax" and recording.test.channels[0].body == "cab"
+    assert recording.test.initial_velocity["cab"] == 9.0
+    assert recording.test.notes[-1] == "names taken from import.yaml"
+
+
+@pytest.mark.parametrize(
+    "wrong, message",
+    [
+        (
+            lambda text: text.replace("INSTRUMENTATION", "INSTR"),
+            "v99.EV5: expected an EV5 header with a section `----- INSTRUMENTATION",
+        ),
+        (
+            lambda text: text.replace("|36.0|0|0|0|9|", "|fast|0|0|0|9|"),
+            "v99.EV5:4: closing speed: expected a number, found 'fast'",
+        ),
+        (
+            lambda text: text.replace("|DRIVER HEAD X", ""),
+            "v99.EV5:8: expected 20 fields in an INSTRUMENTATION record, found 19",
+        ),
+        (
+            lambda text: text.replace("|100|AM|P|DRIVER", "|x|AM|P|DRIVER"),
+            "v99.EV5:8: step: expected a number, found 'x'",
+        ),
+        (lambda text: text.replace("V5|A CAR", "V5"), "v99.EV5:4: expected 20 fields in a TEST record, found 19"),
+    ],
+)
+def test_header_at_fault(tmp_path, wrong, message):
+    file = write_folder(tmp_path) / "v99.EV5"
+    text = file.read_text()
+    assert wrong(text) != text
+    file.write_text(wrong(text))
+    with pytest.raises(RecordingError) as raised:
+        read_source(tmp_path)
+    assert str(raised.value).removeprefix(f"{tmp_path}/").startswith(message)
+
+
+def test_folder_without_curves_or_with_two_headers(tmp_path):
+    write_folder(tmp_path, SENSORS[7:8])
+    with pytest.raises(RecordingError, match="none of the header's 1 curves has a file v99.NNN to use"):
+        read_source(tmp_path)
+    (tmp_path / "v98.ev5").write_text("")
+    with pytest.raises(RecordingError, match="expected one .EV5 header, found v98.ev5, v99.EV5"):
+        read_source(tmp_path)
