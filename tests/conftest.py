@@ -3,12 +3,19 @@
 The imports are in the fixtures: what needs neither ROS nor the viewer does not wait for them.
 """
 
+import signal
+
 import pytest
 from hypothesis import settings
 
 # an example that takes long does so because the other test process, or somebody else, has the processor
 settings.register_profile("no_deadline", deadline=None)
 settings.load_profile("no_deadline")
+
+# a shell that starts the tests in the background, or nohup, has them ignored, and what the tests start would inherit that
+for ending in (signal.SIGINT, signal.SIGHUP):
+    if signal.getsignal(ending) is signal.SIG_IGN:
+        signal.signal(ending, signal.default_int_handler if ending is signal.SIGINT else signal.SIG_DFL)
 
 
 @pytest.fixture

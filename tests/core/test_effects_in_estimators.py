@@ -50,7 +50,8 @@ def test_with_the_known_effect_the_free_run_s_error_falls(effect):
     assert after[worst] < 0.6 * before[worst], (before, after)
     # to the noise in frontal only: where two curves share one balance, as of the dummy's elements or of a car and what
     # is mounted in it, a stiffness that follows the samples may put their force into either: the free run misses both
-    if place == "frontal":
+    # hysteresis is hidden by two dry sliders too, which are not quite the law that the estimators know
+    if place == "frontal" and effect != "hysteresis":
         assert np.sqrt(np.mean(after**2)) < 1.5, (before, after)
 
 

@@ -4,15 +4,9 @@ And what has one place in the packages is nowhere else.
 """
 
 import re
-import subprocess
-import sys
 
+from helpers_modules import modules_after
 from helpers_paths import PACKAGES
-
-
-def modules_after(statement: str) -> set[str]:
-    code = f"import sys; {statement}; print(*sys.modules)"
-    return set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split())
 
 
 def test_the_core_imports_neither_ros_nor_the_viewer():

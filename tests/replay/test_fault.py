@@ -40,7 +40,7 @@ def endless():
         (raising(OSError("no free port")), "error: no free port"),
         (raising(OSError(errno.EBADF, "Bad file")), "error: a fault of the program: OSError: [Errno 9] Bad file"),
         (raising(ZeroDivisionError("division\nby")), "error: a fault of the program: ZeroDivisionError: division by"),
-        (raising(MemoryError()), "error: a fault of the program: MemoryError (at tests/replay/test_fault.py:"),
+        (raising(MemoryError()), "error: a fault of the program: MemoryError (at replay/test_fault.py:"),
         (raising(SystemExit(0)), "error: a fault of the program: SystemExit: 0"),
         (raising(BrokenPipeError(errno.EPIPE, "Broken pipe")), "error: a fault of the program: BrokenPipeError"),
         (endless, "error: a fault of the program: RecursionError: maximum recursion depth exceeded"),

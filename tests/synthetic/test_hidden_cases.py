@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers_modules import modules_after
 from helpers_paths import BAGS
 from helpers_synthetic import SEED, drawn, model_of
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.constants import g as G
-from test_architecture import modules_after
 
 from crash_estimator.core.diagnosis.report.diagnosis import diagnose
 from crash_estimator.model_file import load_model

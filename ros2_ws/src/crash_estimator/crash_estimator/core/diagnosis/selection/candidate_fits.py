@@ -186,10 +186,10 @@ class _Search:
         return analyse(best.fit, sharply=True).white
 
     def ranking(self) -> list[CandidateFit]:
-        """Fitted ones first: a screened gain is an estimate, and does not rank above a fit."""
+        """Fitted ones first: a screened gain is an estimate, and does not rank above a fit that has gained anything."""
         fitted = sorted((one for one in self.found.values() if one.fit), key=lambda one: -one.gain)
         rest = sorted((one for one in self.found.values() if not one.fit), key=lambda one: -one.gain)
-        least = max(fitted[-1].gain, 0.0) if fitted else float("inf")
+        least = min((one.gain for one in fitted if one.gain > 0.0), default=0.0 if fitted else float("inf"))
         return fitted + [one._replace(gain=min(one.gain, least)) for one in rest]
 
 
