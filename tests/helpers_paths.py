@@ -1,4 +1,4 @@
-"""Where things are: the project's root, its recordings, and the real ones that are beside it in the workshop."""
+"""Where things are: the project, its recordings, and real ones in a folder beside it, or where CRASH_DATA says."""
 
 import os
 from pathlib import Path
