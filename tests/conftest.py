@@ -12,7 +12,7 @@ from hypothesis import settings
 settings.register_profile("no_deadline", deadline=None)
 settings.load_profile("no_deadline")
 
-# a shell that starts the tests in the background, or nohup, has them ignored, and what the tests start would inherit that
+# a shell that starts the tests in the background, or nohup, has them ignored, and what the tests start inherits that
 for ending in (signal.SIGINT, signal.SIGHUP):
     if signal.getsignal(ending) is signal.SIG_IGN:
         signal.signal(ending, signal.default_int_handler if ending is signal.SIGINT else signal.SIG_DFL)

@@ -118,7 +118,7 @@ class _System:
         self.carried = [(k, structure.body_index[b.carried_by]) for k, b in enumerate(structure.bodies) if b.carried_by]
         self.origin = np.array([e.origin for e in structure.elements])
         self.never_pulls = np.array([not (e.tension or e.damper_pulls) for e in structure.elements], dtype=bool)
-        self.acts = {a.at for a in structure.actions if a.kind in ("element", "memory", "factor")}
+        self.acts = {a.element for a in structure.actions if a.element >= 0}
         self.remembering = [(j, a) for j, a in enumerate(structure.actions) if a.kind == "memory"]
         self.pressed_only = np.array([not e.tension for e in structure.elements], dtype=bool)
         self.acts |= {k for k, e in enumerate(structure.elements) if e.factor}

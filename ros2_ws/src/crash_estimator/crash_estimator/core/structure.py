@@ -118,7 +118,11 @@ class EffectSpec:
 
 @dataclass(frozen=True)
 class Action:
-    """An effect that no element or body has a place for; `core.effects.applied` makes them, `core.actions` acts."""
+    """An effect that no element or body has a place for; `core.effects.applied` makes them, `core.actions` acts.
+
+    force gives, by kind: element, N of an ElementMotion (g,); memory, what `HystereticForce` says; factor, h of the
+    rate (g,); body, N of the time (g,) s.
+    """
 
     name: str  # of its parameter, such as door_rib.coulomb_friction
     unit: str
@@ -126,12 +130,15 @@ class Action:
     at: int  # the element, or the body: of "inertia" the one that feels it
     coefficient: Coefficient
     scale: float  # order of magnitude of the coefficient
-    force: Callable | None = (
-        None  # element: ElementMotion -> (g,), memory: see `HystereticForce`, factor: rate (g,) -> h, body: time (g,) s -> N
-    )
+    force: Callable | None = None
     body: int = -1  # inertia: whose
     lighter: int = -1  # inertia: the body whose mass it was counted in, -1: none
     share: float = 1.0  # gain, offset: of the channel in its body's acceleration
+
+    @property
+    def element(self) -> int:
+        """The element that it acts on; -1: none."""
+        return self.at if self.kind in ("element", "memory", "factor") else -1
 
 
 @dataclass(frozen=True)
@@ -229,10 +236,7 @@ class Structure:
     def parameters(self) -> tuple[Parameter, ...]:
         """Those of the elements, then one for each action."""
         return self.element_parameters + tuple(
-            Parameter(
-                a.name, a.unit, a.at if a.kind in ("element", "memory", "factor") else -1, False, a.coefficient, a.scale
-            )
-            for a in self.actions
+            Parameter(a.name, a.unit, a.element, False, a.coefficient, a.scale) for a in self.actions
         )
 
     @cached_property
@@ -269,7 +273,7 @@ class Structure:
 
     @property
     def first_order(self) -> bool:
-        """Whether stiffness and damping of the first power, with known unloading, are all there is; dampers may pull."""
+        """Whether springs and dampers of the first power, which may pull, and known unloading are all there is."""
         more = any(e.terms or e.unloading_slope or e.origin or e.factor or not e.damper_pulls for e in self.elements)
         return not (more or self.actions or any(body.carried_by for body in self.bodies))
 

@@ -15,6 +15,6 @@ from .selection.fitted_model import Model
 from .selection.thresholds import THRESHOLDS
 
 __all__ = [
-    "THRESHOLDS", "Diagnosis", "FitCurves", "MisfitWindow", "Model", "OnlineAnswer", "OnlineDiagnosis", "OnlineState", "Ranked",
-    "StepReport", "diagnose", "final_answer",
+    "THRESHOLDS", "Diagnosis", "FitCurves", "MisfitWindow", "Model", "OnlineAnswer", "OnlineDiagnosis", "OnlineState",
+    "Ranked", "StepReport", "diagnose", "final_answer",
 ]  # fmt: skip

@@ -1,4 +1,8 @@
-"""What a file with a user's own effects imports: the kinds of effects, and what their functions are given."""
+"""What a file with a user's own effects imports: the kinds of effects, and what their functions are given.
+
+`HystereticForce` is not among them: what a user's function gives is looked at before it is believed (`user.py`), and of
+a memory with its derivatives that is not done yet.
+"""
 
 from .effect import Addition, Effect, ElementMotion, Shape
 from .kinds import (
@@ -8,7 +12,6 @@ from .kinds import (
     ChannelError,
     ElementForce,
     Gap,
-    HystereticForce,
     PairSpring,
     StaticFactor,
     UnloadingSlope,
@@ -16,5 +19,5 @@ from .kinds import (
 
 __all__ = [
     "Addition", "AttachedBody", "BodyForce", "BodyInertia", "ChannelError", "Effect", "ElementForce", "ElementMotion",
-    "Gap", "HystereticForce", "PairSpring", "Shape", "StaticFactor", "UnloadingSlope",
+    "Gap", "PairSpring", "Shape", "StaticFactor", "UnloadingSlope",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Rate-independent hysteresis (Bouc 1967, Wen 1976): F = c z, a force that yields, and springs back when the motion turns.
+"""Rate-independent hysteresis (Bouc 1967, Wen 1976): F = c z, which yields, and springs back when the motion turns.
 
     dz/dX = (1 - |z|^n (1 + sgn(z dX)) / 2) / X_y,      z from -1 to 1, 0 at first contact
 
@@ -9,7 +9,8 @@ and slipping contacts do so; `coulomb_friction` is its limit for a small X_y, bu
 
 import numpy as np
 
-from .base import HystereticForce, Shape
+from .effect import Shape
+from .kinds import HystereticForce
 
 
 def memory(crush: np.ndarray, start: float, yield_crush: float, exponent: float):

@@ -51,8 +51,8 @@ PUSH = 0.001
 """Of an element's peak force: as little as the integration resolves, for the answer is not linear for long."""
 
 ON_ELEMENTS = (
-    "viscous_damping", "quadratic_damping", "coulomb_friction", "hysteresis", "rate_hardening", "cubic_stiffness", "bottoming_out",
-    "clearance", "plastic_unloading",
+    "viscous_damping", "quadratic_damping", "coulomb_friction", "hysteresis", "rate_hardening", "cubic_stiffness",
+    "bottoming_out", "clearance", "plastic_unloading",
 )  # fmt: skip
 
 SHOWS_OUTSIDE = 3.0 * SHOWS

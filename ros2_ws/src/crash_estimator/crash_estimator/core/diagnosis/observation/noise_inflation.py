@@ -1,7 +1,7 @@
 """Noise as large as what a model leaves: honest weights where nothing in the vocabulary reaches the sensors' noise.
 
 A real structure vibrates, and a lumped model leaves slow errors that its channels share (an error of a force
-pushes one body and damper_pulls the other). So outputs are compared in the band that is meant for the motion of a whole
+pushes one body and pulls the other). So outputs are compared in the band that is meant for the motion of a whole
 structure (SAE J211 CFC 60), and the power that the model leaves there, as a matrix over the channels, takes the
 place of the sensors' noise. Evidence then counts as many independent samples as there are, and a relation
 between channels that holds in spite of a poor force (a balance of inertias) has the weight that it deserves.

@@ -20,6 +20,7 @@ EFFICIENCY = 0.19
 """Share of its samples that the median of fourth differences of white noise is worth (simulated)."""
 
 SMALLEST = 1e-6
+"""Share of the largest value that noise is taken to be at least: a simulation without any is divided by it too."""
 
 
 class Noise(NamedTuple):

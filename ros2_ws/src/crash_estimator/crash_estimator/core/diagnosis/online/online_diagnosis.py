@@ -36,7 +36,7 @@ from .warm_start import carried_on
 
 MOST_CELLS = 36
 CELLS_IN_ALL = 90
-"""Of free curves over their crush magnitudes: as fine as offline where elements are few."""
+"""Of free curves over their crush scales: as fine as offline where elements are few."""
 
 BUDGET = 0.05
 """s of the processor's time; with the candidate that is being fitted then, an update stays below 0.1 s."""

@@ -31,6 +31,7 @@ LEAST = 5
 """Iterations before a fit is given up as hopeless."""
 
 MOST_HALVINGS = 5
+"""Of a step that has made it worse: a thirty-second of it is left then."""
 
 LONGEST_SHAPE_STEP = 0.35
 """Of the logarithm of a shape constant in one iteration: its derivatives hold for a factor of 1.4, not for one of 3."""

@@ -19,7 +19,7 @@ from .problem import OutputErrorProblem, Point
 from .sensitivity_equations import propagate
 
 may_diverge = np.errstate(over="ignore", invalid="ignore", divide="ignore")
-"""A trial step can lead into motions without bounds; that its result is not finite is noticed in `gauss_newton.solve`."""
+"""A trial step can lead into motions without bounds; `gauss_newton.solve` notices that its result is not finite."""
 
 
 class Normal(NamedTuple):
@@ -36,7 +36,7 @@ class Normal(NamedTuple):
 def normal_equations(
     problem: OutputErrorProblem, point: Point, stage: Stage = FREE_RUN, others: Sequence[OtherLaw] = ()
 ) -> tuple[Normal, list[Equations]]:
-    """Summed up over the experiments; others: laws that are only tried out, each with a parameter after the layout's."""
+    """Summed up over the experiments; others: laws that are tried out, each with a parameter after the layout's."""
     size = problem.layout.size + len(others)
     found = Normal(np.zeros((size, size)), np.zeros(size), 0.0, 0, 0.0)
     every = []

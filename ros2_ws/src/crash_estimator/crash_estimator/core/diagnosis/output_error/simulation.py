@@ -1,4 +1,4 @@
-"""The simulation of a problem at given parameters: Newton's method on the whole motion, until it obeys the equations."""
+"""The simulation of a problem at given parameters: Newton's method on the whole motion, until it obeys them."""
 
 from collections.abc import Sequence
 
@@ -11,6 +11,7 @@ from .normal_equations import may_diverge
 from .problem import OutputErrorProblem, Point
 
 MOST_STEPS = 8
+"""Newton's method squares the error in each; a contact that opens at another instant takes one or two more."""
 
 CONVERGED = 1e-6
 """Change of the accelerations, as a share of the largest, at which a simulation is done."""

@@ -16,10 +16,11 @@ ROUGHNESS = 4.0
 """Standard deviation of the slope's change over the whole crush scale, in K; see `adapted_roughness`."""
 
 TAIL = 3.0
+"""Degrees of freedom of the Student-t prior of `adapted_roughness`: the fewest whole number with a finite variance."""
 
 
 class Curve(NamedTuple):
-    """Knots (n,) in m, and for each its parameter's number (n,), -1 for the one at the origin; magnitudes in m and N."""
+    """Knots (n,) in m, and for each its parameter's number (n,), -1 for the one at the origin; scales in m and N."""
 
     knots: np.ndarray
     column: np.ndarray

@@ -37,9 +37,9 @@ class Diagnosis:
     text: str  # one readable line
     residual_rms: Rms  # of the fit
     free_run_rms: Rms  # of a simulation from the initial motion alone
-    ranking: tuple[Ranked, ...]  # of the first round, best first
+    ranking: tuple[Ranked, ...]  # of the first step, best first
     steps: tuple[StepReport, ...]  # effects added, in order
-    remaining: tuple[Ranked, ...]  # what was left of the candidates in the last round
+    remaining: tuple[Ranked, ...]  # what was left of the candidates in the last step
     misfit: tuple[MisfitWindow, ...]  # of the structure as it was given
     misfit_after: tuple[MisfitWindow, ...]
     structure: Structure  # with the effects that were added

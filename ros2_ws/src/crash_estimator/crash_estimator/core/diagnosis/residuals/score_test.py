@@ -44,6 +44,7 @@ TOLD_APART = 12.0
 """Difference of u' S^-1 u: six nats, as of candidates."""
 
 MOST_NAMED = 3
+"""Things that may vary and are named: the line says where to look, and more is no hint."""
 
 
 class Drift(NamedTuple):

@@ -54,7 +54,7 @@ def fit_candidates(
     search.from_model(shortlist(worth, short))
     search.go_on_from([one for one in in_other_noise if one.fit][:short])
     if thorough and model.residuals.mean_square < THRESHOLDS.near_floor:
-        # such an error bends the motion that all curves are fitted to, so that no linearisation tells what it would gain
+        # such an error bends the motion that all curves are fitted to: no linearisation tells what it would gain
         bend = [a for a in additions if _bends_driven_motion(magnitudes, a)]
         if model.white:  # to stand for what was added, one would have had to explain all alone
             fitted = {one.addition.key for one in earlier if one.fit}

@@ -34,7 +34,7 @@ class Thresholds(NamedTuple):
     """Of what the model before it leaves above the floor: an addition that removes less of it, and still leaves more
     than noise, is no explanation."""
     all_but_folds: float = 0.95
-    """Share that two of a kind must remove, where they do not leave noise alone: the rest may be folds of the curves."""
+    """Share that two of a kind must remove, where they leave more than noise: the rest may be folds of the curves."""
 
     # How much is tried
     most_steps: int = 4
@@ -49,7 +49,7 @@ class Thresholds(NamedTuple):
     most_profiles: int = 4
     """Slopes on which an element may unload that are looked at over their value."""
     offset_starts: int = 2
-    """Values of an offset that fits are started from: those with which the forces along the measured motion fit best."""
+    """Values of an offset that fits start from: those with which the forces along the measured motion fit best."""
     first_of_pair: int = 3
     """Candidates that are tried with a second one at once."""
     inflations: int = 3

@@ -12,6 +12,6 @@ from .static_factor import StaticFactor
 from .unloading_slope import UnloadingSlope
 
 __all__ = [
-    "AttachedBody", "BodyForce", "BodyInertia", "ChannelError", "ElementForce", "Gap", "HystereticForce", "PairSpring", "StaticFactor",
-    "UnloadingSlope",
+    "AttachedBody", "BodyForce", "BodyInertia", "ChannelError", "ElementForce", "Gap", "HystereticForce", "PairSpring",
+    "StaticFactor", "UnloadingSlope",
 ]  # fmt: skip

@@ -55,7 +55,7 @@ class AttachedBody(Effect):
         return addition.host, -inertial(addition.target)
 
     def candidates(self, structure, magnitudes):
-        """On every unused channel of the model's axis: what feels the body's inertia, and if its mass was counted in."""
+        """On every unused channel of the axis: what feels the body's inertia, and whether its mass was counted in."""
         for channel in _unused(structure, magnitudes):
             for host in structure.bodies:
                 if host.free or (host.fixed and host.force):

@@ -9,7 +9,7 @@ from ..effect import Addition, Effect
 from ..estimator_model import to_be_given, with_element
 
 STARTS = (0.05, 0.12, 0.25, 0.45)
-"""Shares of the largest crush that a search begins with: each within a factor of 2.4 of the next, as the fit reaches."""
+"""Shares of the largest crush that a search begins with: a fit reaches a factor of 2.4, from one to the next."""
 
 TYPICAL = 0.3
 """Share of the crush scale that a gap is taken to be, for its prior."""
