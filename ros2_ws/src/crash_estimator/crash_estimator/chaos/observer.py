@@ -10,6 +10,7 @@ from crash_msgs.msg import Parameters, Ranking, ReplayState
 from crash_msgs.srv import GetEstimates
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
+from rclpy.task import Future
 
 from crash_replay.attendance import Attendance, Word
 from crash_replay.attending import TOPIC
@@ -20,7 +21,9 @@ from .contents import answer_in, estimates_in
 PIECE = 100
 """Samples that an estimator is asked for at once."""
 PATIENCE = 10.0
-"""s for it to answer."""
+"""s for it to answer; then it is asked again."""
+PAUSE = 1.0
+"""s until it is asked again where it had nothing to give."""
 
 
 class Observer:
@@ -41,6 +44,8 @@ class Observer:
         node = self.node
         for name in estimators:
             node.create_subscription(Parameters, f"{name}/parameters", partial(self._on_parameters, name), EVERY_SAMPLE)
+        self._clients = {name: node.create_client(GetEstimates, f"{name}/get_estimates") for name in estimators}
+        self._asked: dict[str, tuple[Future, float]] = {}  # the newest call, and when another may be made
         node.create_subscription(Ranking, f"{diagnosis}/ranking", self._on_ranking, SAID)
         node.create_subscription(ReplayState, "replay_state", self._on_state, LATCHED)
         node.create_subscription(AttendanceMessage, TOPIC, self._on_word, EVERY_SAMPLE_SAID)
@@ -70,21 +75,28 @@ class Observer:
     def total(self) -> int:
         return self.state.total if self.state else 0
 
-    def ask_for_missed(self, name: str) -> None:
-        """What was said while nobody heard it, once more."""
-        client = self.node.create_client(GetEstimates, f"{name}/get_estimates")
-        start = 0
-        while start < self.total:
-            if start in self.estimates[name]:
-                start += 1
+    def ask_for_missed(self) -> None:
+        """Once the replay is through: what was said while the judge heard nothing, once more. Waits for nobody."""
+        for name, said in self.estimates.items() if self.finished else ():
+            start = next((number for number in range(self.total) if number not in said), None)
+            call, again_at = self._asked.get(name, (None, 0.0))
+            now, client = time.monotonic(), self._clients[name]
+            if start is None or now < again_at or not client.service_is_ready():
                 continue
-            if not self.spin(PATIENCE, client.service_is_ready):
-                break
+            if call:
+                client.remove_pending_request(call)
             call = client.call_async(GetEstimates.Request(start=start, stop=min(start + PIECE, self.total)))
-            if not self.spin(PATIENCE, call.done) or not call.result().success:
-                break
+            call.add_done_callback(partial(self._on_answer, name))
+            self._asked[name] = call, now + PATIENCE
+
+    def has_heard_all(self, name: str) -> bool:
+        return len(self.estimates[name]) >= self.total
+
+    def _on_answer(self, name: str, call) -> None:
+        answered = not call.cancelled() and call.exception() is None and call.result().success
+        if answered:
             self._on_parameters(name, call.result().parameters)
-        self.node.destroy_client(client)
+        self._asked[name] = call, time.monotonic() + (0.0 if answered else PAUSE)
 
     def _on_parameters(self, name: str, message: Parameters) -> None:
         for number, digest in estimates_in(message):

@@ -13,7 +13,7 @@ from .case import BUSY, COLD_CACHES, HANG_UP, ONE_CORE, Case
 from .faults import Faults
 from .judge import Content, Ended, Outcome, Verdict, judged
 from .members import Member, children_of, command_line, send
-from .observer import Observer
+from .observer import PATIENCE, Observer
 from .recordings import bag_of
 from .uses import DIAGNOSIS, STARTER, USES, Broken, estimators_of
 
@@ -90,15 +90,18 @@ class Run:
         limit = time.monotonic() + LIMIT + self.case.seconds + COMPILING * (COLD_CACHES in self.conditions)
         while self.faults.active or not self.use.is_over():
             self.observer.spin(0.02)
+            self.observer.ask_for_missed()
             if self.observer.finished and not self.finished_at:
                 self.finished_at = time.monotonic()
             self.faults.look()
             if time.monotonic() > limit:
                 running = [member.name for member in self.use.members if member.status is None]
                 return f"after {LIMIT + self.case.seconds:g} s still running: {', '.join(running)}"
-        for name in self.estimators:
-            if name in self.tops and self.tops[name].status is None:
-                self.observer.ask_for_missed(name)
+        running = [name for name in self.estimators if name in self.tops and self.tops[name].status is None]
+        deadline = time.monotonic() + PATIENCE
+        while not all(map(self.observer.has_heard_all, running)) and time.monotonic() < deadline:
+            self.observer.spin(0.02)
+            self.observer.ask_for_missed()
         return ""
 
     def _end(self) -> list[Ended]:

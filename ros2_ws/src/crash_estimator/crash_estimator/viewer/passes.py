@@ -100,11 +100,11 @@ class Pass:
                 self.drawn.setdefault(item.estimator, Counter())[type(item)] += len(item.time_ns)
             if self.jury and isinstance(item, Block):
                 self.jury.hear(item)
-        if self.jury and self.complete:
-            self._judge()
 
-    def _judge(self) -> None:
-        """Once all have been drawn to the last sample."""
+    def judge(self) -> None:
+        """Once, when all have been drawn to the last sample."""
+        if not (self.jury and self.complete):
+            return
         jury, self.jury = self.jury, None
         judged = self.attempt(jury.verdicts)
         for show in self.shows if judged else ():
@@ -115,10 +115,10 @@ class Pass:
         self._saved_at = time.monotonic()
         self.shows[1].write(unsaved)
 
-    def end(self, incomplete: str = "") -> None:
+    def end(self, incomplete: str = "", overtaken: bool = False) -> None:
         """Nothing more comes: draw what waits, write the file's footer, let go of all that took memory.
 
-        incomplete: said in the summary.
+        incomplete: said in the summary; overtaken: by the next pass, so that only what a file shows is judged still.
         """
         if self.ended:
             return
@@ -126,6 +126,8 @@ class Pass:
         self._write([], at_once=True)
         if self._unsaved:
             self._save()
+        if self.path or not overtaken:
+            self.judge()
         self.names = self.shows[0].cast.names if self.shows else ()
         for k in reversed(range(len(self.recordings))):  # the file first, whatever a viewer does
             try:

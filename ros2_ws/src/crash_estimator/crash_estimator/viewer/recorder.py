@@ -223,6 +223,8 @@ class Recorder:
         self._write(said)
         if nothing and self._passes:  # who waits for an estimator that does not come waits no longer
             self._guarded(lambda: list(self._passes.values())[-1].write([]))
+        if not self._queue and self._passes:  # passes that follow faster than they can be judged are only drawn
+            self._guarded(list(self._passes.values())[-1].judge)
         with self._guard:
             self._busy = False
 
@@ -255,7 +257,7 @@ class Recorder:
         return pass_
 
     def _end_pass(self, key: tuple[int, int]) -> None:
-        self._passes[key].end()
+        self._passes[key].end(overtaken=True)
         self._over = max(self._over, key)
         if not self._passes[key].path:
             del self._passes[key]
