@@ -29,7 +29,7 @@ RECORDING = "frontal"
 PATIENT = {"viewer", "record"}
 """Who says a second after the last message that it was the last: they are waited for only every so many tests."""
 EVERY = 10
-SERVED = "20MB"
+SERVED = "4MB"
 """What the viewer keeps for screens that come late: reached long before the memory must be what it stays."""
 
 

@@ -26,6 +26,8 @@ PERIOD = 0.05
 """s between batches while little is going on."""
 SHARE = 0.2
 """Of the time that writing may take: the longer a batch takes, the rarer, larger and so cheaper they become."""
+LONGEST = 0.5
+"""s between batches at most: what a new pass costs becomes no cheaper, and what waits must not grow without end."""
 
 RUSH, HOLD = 30e6, 256e6
 """While more than RUSH bytes come in a second, drawing is put off until HOLD bytes wait: nobody can look at what goes
@@ -189,7 +191,8 @@ class Recorder:
                 continue
             self._write_batch()
             if not was_rush or self._stepped_back:  # after a rush what was put off comes at once, and nothing is slowed
-                pause = max(PERIOD, (time.monotonic() - began) * (1 - SHARE) / SHARE)
+                took = time.monotonic() - began
+                pause = min(max(PERIOD, took * (1 - SHARE) / SHARE), LONGEST)
         self._write_batch()
         incomplete = self._incomplete
         for pass_ in reversed([*filter(None, [self._spare]), *self._passes.values()]):  # the one with the server last
