@@ -40,7 +40,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "--good-enough", metavar="RATING|PERCENT%", type=_tolerance, default=DEFAULT,
         help="what may be left in every channel: an ISO/TS 18571 rating, as in 0.8, or an RMS as a share of the peak, "
-        "as in 5%%; a model that is as good is adequate as it is. Default: 2%% completes an explanation, no more",
+        "as in 5%%; a model that is as good is adequate as it is. Default: 1%% completes an explanation, no more",
     )  # fmt: skip
     parser.add_argument("--json", metavar="FILE", help="write everything that was found")
     parser.add_argument(
@@ -72,7 +72,9 @@ def run(arguments: argparse.Namespace) -> None:
     check_written(arguments, *arguments.bags, json=arguments.json, apply=arguments.apply)
     effects = effects_of(arguments)
     structure = load_model(arguments.model, effects)
-    found = diagnose(structure, [read_bag(bag) for bag in arguments.bags], effects, arguments.good_enough, arguments.time_limit)
+    found = diagnose(
+        structure, [read_bag(bag) for bag in arguments.bags], effects, arguments.good_enough, arguments.time_limit
+    )
     if arguments.json:  # files before words: `| head` ends this at a line that nobody reads
         write_json(arguments.json, found.as_json())
     believed = found.verdict != UNEXPLAINED or arguments.apply_unexplained

@@ -110,7 +110,7 @@ def _answer(structure: Structure, path: SelectionPath, drift: Drift, tolerance: 
     pairs = zip(steps, models, models[1:], zip(runs, runs[1:], strict=False), strict=False)  # the last has no successor
     reports = tuple(step_of(*each, final) for each in pairs)[: len(added)]
     ranking, after = ranking_of(steps[0]), left_by(final, band)
-    evidence = Evidence(len(added), final.white, drift, before, after, ranking)
+    evidence = Evidence(len(added), final.white, drift, before, after, ranking, final.fit.problem.noise_is_inflated)
     verdict = verdict_on(evidence, tolerance)
     floor = noise_floor(first.fit.layout, first.records)
     return Diagnosis(

@@ -34,7 +34,9 @@ def _adequate(evidence: Evidence, tolerance: Tolerance, final: Model, floor: flo
     left = f"residual RMS {final.residuals.rms / G:.3g} g, noise floor {floor / G:.3g}"
     if not evidence.noise:
         return f"{_what_is_left(evidence.after)}, is within {tolerance.text} ({left})"
-    until = "" if _unloads(final) else "; the recording ends before anything unloads: what would come then is not judged"
+    until = (
+        "" if _unloads(final) else "; the recording ends before anything unloads: what would come then is not judged"
+    )
     return f"nothing significant is missing ({left}){until}"
 
 
@@ -91,7 +93,7 @@ def _what_is_left(left: Left) -> str:
     if not left.channels:
         return "what is left"
     worst = left.channels[0]
-    return f"what is left, {100.0 * worst.of_peak:.2g} % of the peak of {worst.channel}"
+    return f"what is left, {100.0 * worst.of_peak:.3g} % of the peak of {worst.channel}"
 
 
 def _unloads(model: Model) -> bool:

@@ -42,8 +42,8 @@ class Thresholds(NamedTuple):
     named_share: float = 0.5
     """Of the misfit, that what is named must explain: more than all else that may be missing."""
     varying: float = 0.45
-    """Share of what is left that goes along with something varying in time: from it on no effect is named. Of 15
-    development cases outside the vocabulary to which an effect was added all had 0.53 and more; of 20 recordings of
+    """Share of what is left that goes along with something varying in time: from it on no effect is named. Of 18
+    development cases outside the vocabulary to which an effect was added all had 0.48 and more; of 20 recordings of
     real structures, and of simulated ones that lack a law, 0.38 at most."""
 
     # How much is tried
