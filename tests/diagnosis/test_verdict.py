@@ -34,7 +34,7 @@ def ranked(effect: str, target: str, evidence: float, fitted: bool = True) -> Ra
 
 
 LEADER = ranked("coulomb_friction", "car_barrier", 50.0)
-EVIDENCE = Evidence(1, False, STANDS_STILL, left(0.2, 10.0, 0.5), left(0.05, 2.0), (LEADER,), True)
+EVIDENCE = Evidence(1, False, STANDS_STILL, left(0.2, 10.0, 0.5), left(0.05, 2.0), (LEADER,), True, True)
 
 
 @pytest.mark.parametrize(
@@ -47,6 +47,7 @@ EVIDENCE = Evidence(1, False, STANDS_STILL, left(0.2, 10.0, 0.5), left(0.05, 2.0
         ({"drift": STANDS_STILL._replace(share=0.8)}, DEFAULT, "unexplained", False),
         ({"white": True}, DEFAULT, "unexplained", False),  # it looks like noise, and varies with time
         ({"weighed": False}, DEFAULT, "unexplained", False),
+        ({"certain": False}, DEFAULT, "unexplained", False),
         ({"added": 3}, DEFAULT, "unexplained", False),
         ({"ranking": (LEADER, ranked("clearance", "engine", 45.0))}, DEFAULT, "unexplained", False),
         ({"ranking": (LEADER, ranked("clearance", "engine", 45.0, fitted=False))}, DEFAULT, "effect_missing", False),

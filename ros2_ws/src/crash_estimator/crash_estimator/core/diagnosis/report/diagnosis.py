@@ -13,7 +13,7 @@ from ..observation.record import observe
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import free_run, noise_floor
 from ..residuals.score_test import Drift, drift_of
-from ..selection.assumptions import SelectionPath, select
+from ..selection.assumptions import SelectionPath, first_believed, select
 from ..selection.fitted_model import Model
 from ..selection.time_limit import out_of_time, time_limit
 from .left import Left, band_of, left_by
@@ -41,6 +41,7 @@ class Diagnosis:
     verdict: str  # effect_missing, adequate or unexplained
     complete: bool  # what is left is noise, or within the tolerance
     left: Left  # with what was added
+    left_before: Left  # as given, in the same band
     noise: bool  # it is noise
     tolerance: Tolerance
     text: str  # one readable line
@@ -88,7 +89,8 @@ def diagnose(
     if not recordings:
         raise ModelError("a diagnosis needs at least one recording")
     with time_limit(seconds):
-        path = select(structure, [observe(structure, recording) for recording in recordings], effects)
+        records = [observe(structure, recording) for recording in recordings]
+        path = first_believed(select(structure, records, effects), records)
         stopped = out_of_time()
     found = _answer(structure, path, drift_of(path.as_recorded), tolerance)
     if not stopped:
@@ -110,13 +112,15 @@ def _answer(structure: Structure, path: SelectionPath, drift: Drift, tolerance: 
     pairs = zip(steps, models, models[1:], zip(runs, runs[1:], strict=False), strict=False)  # the last has no successor
     reports = tuple(step_of(*each, final) for each in pairs)[: len(added)]
     ranking, after = ranking_of(steps[0]), left_by(final, band)
-    evidence = Evidence(len(added), final.white, drift, before, after, ranking, final.fit.problem.noise_is_inflated)
+    weighed, certain = final.fit.problem.noise_is_inflated, all(abs(one.coefficient) > one.std for one in reports)
+    evidence = Evidence(len(added), final.white, drift, before, after, ranking, weighed, certain)
     verdict = verdict_on(evidence, tolerance)
     floor = noise_floor(first.fit.layout, first.records)
     return Diagnosis(
         verdict=verdict.word,
         complete=verdict.complete,
         left=after,
+        left_before=before,
         noise=evidence.noise,
         tolerance=tolerance,
         text=verdict_text(verdict, evidence, tolerance, reports, first, final, floor, path.structure is structure),

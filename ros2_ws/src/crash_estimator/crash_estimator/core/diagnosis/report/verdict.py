@@ -22,6 +22,7 @@ class Evidence(NamedTuple):
     after: Left  # with what was added
     ranking: Sequence[Ranked]  # of the first step
     weighed: bool  # the evidence was taken in a noise as large as what is left
+    certain: bool  # every coefficient that was added is beyond its standard deviation
 
     @property
     def noise(self) -> bool:
@@ -59,7 +60,12 @@ def _stands_still(drift: Drift) -> bool:
 def _explains(evidence: Evidence) -> bool:
     """In the sensors' noise the evidence of what leaves more than that knows no doubt: it has to be weighed first."""
     few = evidence.added <= THRESHOLDS.most_at_once
-    return few and evidence.weighed and evidence.after.share_explained(evidence.before) > THRESHOLDS.named_share
+    return (
+        few
+        and evidence.weighed
+        and evidence.certain
+        and evidence.after.share_explained(evidence.before) > THRESHOLDS.named_share
+    )
 
 
 def _beats_its_rivals(ranking: Sequence[Ranked]) -> bool:

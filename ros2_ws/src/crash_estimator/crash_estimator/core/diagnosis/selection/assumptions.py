@@ -56,6 +56,16 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
     return path
 
 
+def first_believed(path: SelectionPath, records: Sequence[ObservedRecord]) -> SelectionPath:
+    """Up to as many additions as are believed together, where all of them leave more than noise: the first ones explain
+    most, and what came after them only goes on from there."""
+    most = THRESHOLDS.most_at_once
+    if path.final.white or len(path.final.additions) - path.present <= most:
+        return path
+    final = path.steps[most].before
+    return path._replace(steps=path.steps[: most + 1], final=final, as_recorded=in_the_sensors_noise(final, records))
+
+
 def never_pulling(structure: Structure) -> Structure:
     """The structure whose dampers never pull where their element carries compression only; itself where none can."""
     if all(element.tension or not element.damper_pulls for element in structure.elements):
