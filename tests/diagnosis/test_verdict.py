@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers_paths import ROOT
 
 from crash_estimator.cli import diagnose as command
 from crash_estimator.core.diagnosis import diagnose
@@ -19,7 +20,6 @@ from crash_replay.bag import read_bag
 from crash_replay.conditioning import filter_recording
 from crash_replay.recording import Recording
 from crash_replay.synthetic.hidden.cases import draw_case
-from helpers_paths import ROOT
 
 FRONTAL = ROOT / "bags" / "frontal_single.mcap"
 STANDS_STILL = Drift(False, 1e-9, "the mass of car", 0.1)
