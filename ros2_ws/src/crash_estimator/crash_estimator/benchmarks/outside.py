@@ -27,12 +27,13 @@ from .effects_results import ONE_THREAD
 
 HEAD = """# Recordings that nobody here made
 
-`make benchmark-outside DATA=FOLDER`: recordings of other people's systems with a known truth, one diagnosis each, from models
-that lack what is to be found. The recordings do not come with the project. Error: RMS of what is left, in the band that the
-model speaks for, as given and with what was named; processor: seconds.
+`make benchmark-outside DATA=FOLDER`: recordings of other people's systems with a known truth, one diagnosis each,
+from models that lack what is to be found. The recordings do not come with the project. Error: RMS of what is left,
+in the band that the model speaks for, as given and with what was named; processor: seconds.
 
-All of these were looked at while the verdict's two numbers were chosen (half of the misfit explained, less than 0.45 of the
-rest varying with time): they show what it says, and judge nothing."""
+All of these were looked at while the verdict's two numbers were chosen (half of the misfit explained, less than 0.45
+of the rest varying with time): they show what it says, and judge nothing.
+"""
 
 DAMPING_AT_RATIO_1 = 93.6
 """N s/m, of the impactor's programmed damper: 23.4 at a ratio of 0.25, 46.8 at 0.5."""
