@@ -9,7 +9,7 @@ from .acceptance import better, explains_too_little, needed_gain
 from .candidate_fits import CandidateFit
 from .fitted_model import Model, fit_model
 from .pair_search import two_at_once
-from .pruning import without_the_superseded
+from .pruning import up_to_the_least_error, without_the_superseded
 from .selection_step import SelectionStep, added, selection_step
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
@@ -26,7 +26,11 @@ def forward_selection(
     pair = two_at_once(magnitudes, effects, given, path[0].as_recorded)
     if pair is None:
         return path, final
-    return _one_by_one(pair.magnitudes, effects, pair.model, pair.path, len(present))
+    other = _one_by_one(pair.magnitudes, effects, pair.model, pair.path, len(present))
+    if other[1].white:
+        return other
+    paths = [up_to_the_least_error(*one, len(present)) for one in (other, (path, final))]
+    return min(paths, key=lambda one: one[1].residuals.mean_square)
 
 
 def _one_by_one(
