@@ -25,8 +25,8 @@ def _is_bag(path: Path) -> bool:
 
 READERS = (
     Reader("a .csv file with a .yaml of the same name beside it", csv_yaml.found, csv_yaml.read),
-    Reader("a folder with an .EV5 header", nhtsa.found, nhtsa.read, ("cells",)),
-    Reader("a folder with an .mme header", isomme.found, isomme.read),
+    Reader("a folder with an .EV5 header", nhtsa.found, nhtsa.read, ("cells", "all_sensors")),
+    Reader("a folder with an .mme header", isomme.found, isomme.read, ("all_sensors",)),
     Reader("a bag (a rosbag2 folder or an .mcap file)", _is_bag, read_bag, ("recover",)),
 )
 
