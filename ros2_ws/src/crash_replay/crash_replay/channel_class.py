@@ -58,3 +58,8 @@ def class_of(channel: Channel) -> ChannelClass:
         if channel.quantity in row.quantities and re.search(row.words, said):
             return row.found
     return OTHER_OF_A_DUMMY if DUMMY.search(said) else VEHICLE
+
+
+def frequency_class(text: str) -> int | str:
+    """On a command line: a number, or `class`."""
+    return int(text) if text.isdigit() else text

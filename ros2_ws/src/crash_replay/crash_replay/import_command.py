@@ -9,11 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from .bag import write_bag
-from .channel_class import BY_CLASS
+from .channel_class import BY_CLASS, frequency_class
 from .conditioning import CFC_CLASSES, filter_recording, remove_offset, select_channels
 from .fault import guarded
 from .foreign_text import visible
 from .import_report import found, import_report
+from .onset import at_onset, onset_note
 from .output import check_outputs, write_text
 from .readers import READERS, read_source
 from .recording import Recording
@@ -63,7 +64,11 @@ def import_recording(given: argparse.Namespace) -> Recording:
     )
     if given.channels:
         recording = select_channels(recording, given.channels)
+    if given.time_zero == "auto":
+        recording = at_onset(recording)
     doubts = (*gaps_in_time(recording), *doubtful_channels(recording))  # before a filter smooths the signs away
+    if doubt := onset_note(recording):
+        doubts += (doubt,)
     recording = replace(recording, test=replace(recording.test, notes=recording.test.notes + doubts))
     if given.offset:
         recording = remove_offset(recording)
@@ -74,7 +79,7 @@ def _parser() -> argparse.ArgumentParser:
     forms = "; ".join(reader.expects for reader in READERS)
     parser = Parser(
         prog="import",
-        description=f"Make a bag of a recording. SOURCE is one of: {forms}.",
+        description=f"Make a bag of a recording. SOURCE is one of: {forms}; nhtsa:NUMBER, a test of NHTSA's public database.",
         epilog=NAMES_HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -82,6 +87,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--to", type=Path, required=True, metavar="BAG", help="rosbag2 folder, or one file if it ends in .mcap"
     )
+    parser.add_argument(
+        "--time-zero", choices=("stated", "auto"), default="stated",
+        help="auto: the impact is where the signals leave their rest, not where the recording states it",
+    )  # fmt: skip
     parser.add_argument("--offset", action="store_true", help="remove each channel's mean before the impact")
     parser.add_argument(
         "--cfc", type=frequency_class, choices=(BY_CLASS, *CFC_CLASSES),
@@ -106,10 +115,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--force", action="store_true", help="replace BAG if it exists")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was done to FILE as well")
     return parser
-
-
-def frequency_class(text: str) -> int | str:
-    return int(text) if text.isdigit() else text
 
 
 def _size(bag: Path) -> str:

@@ -2,11 +2,12 @@
 
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from typing import TypeVar
 
 from .fault import tell
+from .foreign_text import visible
 
 Item = TypeVar("Item")
 FIRST_AFTER, THEN_EVERY = 3.0, 5.0
@@ -17,22 +18,27 @@ ON_A_TERMINAL = 0.2
 
 def with_progress(items: Sequence[Item], what: str) -> Iterator[Item]:
     """The items one by one; `what` is "reading curve"."""
-    yield from counted(items, len(items), what)
-
-
-def counted(items: Iterable[Item], total: int, what: str) -> Iterator[Item]:
-    """The same where the number of items is known otherwise."""
-    began = last = time.monotonic()
-    shown, terminal = False, _is_terminal()
+    counter = Counter(what, len(items))
     for number, item in enumerate(items, start=1):
         yield item
+        counter.at(number)
+
+
+class Counter:
+    """Says how many of `total` are done, where it takes long."""
+
+    def __init__(self, what: str, total: int):
+        self.what, self.total = what, total
+        self.began = self.last = time.monotonic()
+        self.shown, self.terminal = False, _is_terminal()
+
+    def at(self, number: int) -> None:
         now = time.monotonic()
-        pause = ON_A_TERMINAL if terminal else THEN_EVERY
-        if now - began > FIRST_AFTER and now - last > pause:
-            shown, last = True, now
-            _show(f"{what} {number} of {total}, {now - began:.0f} s", terminal)
-    if shown:
-        _show(f"{what} {total} of {total}, {time.monotonic() - began:.0f} s", terminal, ends=True)
+        ends = self.shown and number >= self.total
+        pause = ON_A_TERMINAL if self.terminal else THEN_EVERY
+        if ends or (now - self.began > FIRST_AFTER and now - self.last > pause and number < self.total):
+            self.shown, self.last = not ends, now
+            _show(f"{self.what} {number} of {self.total}, {now - self.began:.0f} s", self.terminal, ends)
 
 
 def _is_terminal() -> bool:
@@ -46,4 +52,5 @@ def _show(line: str, terminal: bool, ends: bool = False) -> None:
         tell(line)
         return
     with suppress(OSError, ValueError):
-        print(f"\r\x1b[K{line}", end="\n" if ends else "", file=sys.stderr, flush=True)
+        sys.stderr.write(f"\r\x1b[K{visible(line)}{chr(10) if ends else ''}")
+        sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""`report BAG --model M --to DIR`: the thesis's tables and figures for one recording, as a Markdown page."""
+"""`report RECORDING --model M --to DIR`: the thesis's tables and figures for one recording, as one HTML page that opens anywhere."""
 
 import argparse
 import sys
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from crash_replay.conditioning import CFC_CLASSES
-from crash_replay.fault import guarded
+from crash_replay.fault import guarded, tell
 from crash_replay.foreign_text import visible
 from crash_replay.output import OutputError
 from crash_replay.said import Parser, say
@@ -15,7 +15,7 @@ from crash_replay.said import Parser, say
 from ..core.methods import METHODS
 from ..model_file import load_model, ready_models
 from ..report_page import write_report
-from .common import add_effects_option, check_written, effects_of, read_crash
+from .common import RECORDING, add_effects_option, check_written, effects_of, read_crash
 from .simulate import smoother
 
 SHOWN = ["rls", "mrls", "constrained_kalman"]
@@ -27,9 +27,10 @@ def main() -> None:
 
 def _parser() -> Parser:
     parser = Parser(prog="report", description=__doc__.partition(": ")[2])
-    parser.add_argument("bag", metavar="BAG", help="a recording: rosbag2 folder or .mcap file")
+    parser.add_argument("bag", metavar="RECORDING", help=RECORDING)
     parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
-    parser.add_argument("--to", required=True, metavar="DIR", help="folder for report.md and its figures")
+    parser.add_argument("--to", required=True, metavar="DIR", help="folder for report.html")
+    parser.add_argument("--markdown", action="store_true", help="write report.md with its figures as well")
     known = [method for method in METHODS if method != "effective_mass"]
     parser.add_argument("--methods", nargs="+", default=SHOWN, choices=known, help="the last one's forces run free")
     parser.add_argument("--end", type=float, default=np.inf, metavar="S", help="judge up to this time after the impact")
@@ -44,16 +45,16 @@ def report(arguments: argparse.Namespace) -> None:
     folder = Path(arguments.to)
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"{visible(folder)} is a file: --to takes a folder")
-    check_written(arguments, arguments.bag, to=folder / "report.md")
+    check_written(arguments, arguments.bag, to=folder / "report.html")
     effects = effects_of(arguments)
     structure = load_model(arguments.model, effects)
     recording = read_crash(arguments.bag)
     smooth, said = smoother(recording, arguments.cfc)
-    page, figures = write_report(
+    page = write_report(
         recording, structure, list(dict.fromkeys(arguments.methods)), folder, arguments.end, smooth, said,
-        effects=effects,
+        effects=effects, markdown=arguments.markdown, told=tell,
     )  # fmt: skip
-    say(f"{recording.test.id}: {visible(page)} and {figures} figures")
+    say(f"{recording.test.id}: {visible(page)}")
 
 
 if __name__ == "__main__":

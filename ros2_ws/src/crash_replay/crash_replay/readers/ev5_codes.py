@@ -1,4 +1,4 @@
-"""What the codes of an EV5 header stand for: where a sensor is (SENLOC) and who sits where (OCCLOC).
+"""What the codes of an EV5 header stand for: what a sensor is attached to (SENATT) and at whose seat (SENLOC).
 
 The codes are those of NHTSA's test reference guide, version 5, as far as their meaning is certain. A code that is not
 here keeps its letters as its name, which still tells it from every other.
