@@ -30,7 +30,8 @@ def first_sentence(found: Diagnosis, model: str, test: str) -> str:
         f"{step.effect.replace('_', ' ')} on {step.target} ({step.coefficient:.4g} ± {step.std:.2g} {step.unit})"
         for step in found.steps
     )
+    rest = "" if found.complete else ", and what is left is more than noise"
     return (
         f"Model {model} lacks {lacks}: with it the error on test {test} falls from {before} to {after} RMS; the sensors' "
-        f"noise is {floor}."
+        f"noise is {floor}{rest}."
     )

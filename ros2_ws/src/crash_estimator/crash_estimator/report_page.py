@@ -45,17 +45,18 @@ def write_report(
     settings: Mapping[str, float] = {},
     effects: Mapping[str, Effect] = EFFECTS,
     markdown: bool = False,
+    seconds: float = np.inf,
     told: Callable[[str], None] = lambda line: None,
 ) -> Path:
     """Write `report.html` into the folder, with `markdown` also `report.md` and its figures -> the page.
 
-    The settings go to the methods that have them; `told` hears of each part when it is done, and how long it took.
+    The settings go to the methods that have them; seconds: after which the diagnosis tries nothing more; `told` hears of each part when it is done, and how long it took.
     """
     if not ((recording.time > 0.0) & (recording.time <= end)).any():
         raise ModelError(f"test {recording.test.id} has no samples between the impact and {end:g} s")
     step = partial(_timed, told)
     with step("diagnosis"):
-        sentence, missing = _missing(recording, structure, end, effects)
+        sentence, missing = _missing(recording, structure, end, effects, seconds)
     estimated = partial(_estimated, recording, structure, end=end, effects=effects)
     structure = applied(structure, recording.test, effects)
     results = {}
@@ -112,13 +113,13 @@ def _test(recording: Recording, structure: Structure, end: float) -> list[Block]
 
 
 def _missing(
-    recording: Recording, structure: Structure, end: float, effects: Mapping[str, Effect]
+    recording: Recording, structure: Structure, end: float, effects: Mapping[str, Effect], seconds: float
 ) -> tuple[str, list[Block]]:
     """The page's first sentence and what `diagnose` says; or why it says nothing, which is no reason to say nothing else."""
     until = recording.time <= end
     judged = Recording(recording.test, recording.time_ns[until], recording.values[until])
     try:
-        found = diagnose(structure, [judged], effects)
+        found = diagnose(structure, [judged], effects, seconds=seconds)
     except (ModelError, RecordingError) as error:
         why = f"What the model lacks was not searched for: {error}."
         return f"Model {structure.name} on test {recording.test.id}: parameters, errors and free run. {why}", []
