@@ -144,4 +144,4 @@ def test_simulate_and_report_honour_the_effect(monkeypatch, capsys, folder):
     ]
     assert errors[1] < 0.5 * errors[0]
     assert command(monkeypatch, report, bag, "--model", model, "--to", folder / "page") == 0
-    assert "viscous_damping" in (folder / "page" / "report.md").read_text()
+    assert "viscous_damping" in (folder / "page" / "report.html").read_text()

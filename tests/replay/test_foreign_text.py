@@ -138,7 +138,7 @@ def test_an_import_prints_and_keeps_it_so_that_it_can_be_printed(hostile, monkey
 
 def test_a_report_is_a_page_and_no_more(hostile, monkeypatch, capsys, tmp_path):
     pytest.importorskip("matplotlib")
-    arguments = [hostile / "bag", "--model", hostile / "model.yaml", "--to", tmp_path, "--methods", "rls"]
+    arguments = [hostile / "bag", "--model", hostile / "model.yaml", "--to", tmp_path, "--methods", "rls", "--markdown"]
     status, out, err = run(monkeypatch, capsys, report, *arguments)
     assert status == 0, err
     page = (tmp_path / "report.md").read_text()

@@ -50,7 +50,8 @@ def test_import_says_what_it_did_and_left_out(source, tmp_path, capsys):
         "S1: Half sine",
         "2000 samples, 10 kHz, -0.0500 to 0.1499 s, 2 channels",
         "initial velocity 15 m/s: car",
-        "- left out, not described in s.yaml: trigger",
+        "  left out  why",
+        "  trigger   not described in s.yaml",
         "- filtered with CFC 60 (SAE J211-1), all channels",
     ):
         assert line in said.out.splitlines()

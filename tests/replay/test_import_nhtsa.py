@@ -144,7 +144,7 @@ def curve(comment, sensor="AC", occupant="NA", location="XXXX", axis="XG", unit=
         (curve("DRIVER LEFT FOOT Z - FRONT", occupant="01", axis="ZL"), "driver_left_foot_front_az"),
         (curve("BARRIER K-01 Fx", "LC", location="LC1101", unit="NWT", vehicle=0), "barrier_k01_fx"),
         (curve("BOTTOM OF ENGINE X: No valid data after 67ms"), "engine_bottom_ax"),
-        (curve("", location="VECG", axis="NA"), "vecg_a"),
+        (curve("", location="VECG", axis="NA"), "cg_a"),
         (curve("3RD ROW X"), "xxxx_3rd_row_ax"),
     ],
 )

@@ -5,8 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.constants import g as G
 
+from crash_replay.shown_units import readable
+
 from .core.diagnosis import THRESHOLDS, Diagnosis, MisfitWindow, Model, Ranked
-from .tables import READABLE, table
+from .tables import table
 
 SHOWN = 8
 
@@ -98,11 +100,18 @@ def revisions_table(found: Diagnosis) -> str:
     floor = [f"{value:#.3g}" for value in _each_output(first, noise)]
     rows.append(("noise floor", f"{found.residual_rms.noise_floor / G:#.3g}", *floor, "", ""))
     outputs = first.fit.layout.outputs
-    heads = [f"{output.channel} {'kN' if output.fixed else 'g'}" for output in outputs]
+    heads = [f"{output.channel} {unit}" for output, (unit, _) in zip(outputs, _units(first))]
     return table(("RMS of the error", "all g", *heads, "run freely g", "white"), rows)
 
 
 def _each_output(model: Model, values: Sequence[np.ndarray]) -> list[float]:
     """RMS of each output over the records, in the unit shown; values: per record (n, q) SI."""
-    factor = [READABLE["N" if output.fixed else "m/s^2"][1] for output in model.fit.layout.outputs]
+    factor = [factor for _, factor in _units(model)]
     return list(np.sqrt(np.nanmean(np.concatenate(values) ** 2, axis=0)) * factor)
+
+
+def _units(model: Model) -> list[tuple[str, float]]:
+    """Of each output, by the size of what was measured: the unit shown, and the factor to it."""
+    measured = np.concatenate([record.measured for record in model.records])
+    units = ["N" if output.fixed else "m/s^2" for output in model.fit.layout.outputs]
+    return [readable(unit, measured[:, k]) for k, unit in enumerate(units)]

@@ -4,19 +4,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from crash_replay.shown_units import readable
+
 from .core.effects.effect import Effect
 from .core.errors import EquationError
 from .core.estimate import Description, Estimate, ParameterStatus
 from .core.structure import EffectSpec
 
-READABLE = {
-    "N/m": ("kN/m", 1e-3),
-    "N*s/m": ("N s/m", 1.0),
-    "m/s^2": ("g", 1.0 / 9.80665),
-    "N": ("kN", 1e-3),
-    "kg": ("kg", 1.0),
-}
-"""SI unit -> the unit shown and the factor to it."""
+PEAK_PER_DEVIATION = 3.0
+"""A signal's peak is taken to be so many of its standard deviations where only those are known."""
 
 OF_ELEMENTS = ("N/m", "N*s/m", "kg")
 """Units in which a tenth is fine enough; an effect's coefficient, such as a gain of 0.07, may be of any size."""
@@ -37,10 +33,12 @@ def parameter_table(description: Description, estimates: Sequence[Estimate]) -> 
     """Every parameter where its element carries most, with sigma and status, and that peak force; a mass at the end."""
     rows = []
     element_of = {name: k for k, name in enumerate(description.elements)}
+    peaks = np.abs([estimate.force for estimate in estimates]).max(axis=0, initial=0.0)
+    force_unit, per_newton = readable("N", peaks)
     for k, (name, unit) in enumerate(zip(description.parameters, description.parameter_units)):
         element = element_of.get(name.rsplit(".", 1)[0])
         peak = estimates[-1] if element is None else max(estimates, key=lambda estimate: abs(estimate.force[element]))
-        shown, factor = READABLE.get(unit, (unit, 1.0))
+        shown, factor = readable(unit, [peak.parameters[k]])
         known = ParameterStatus(peak.status[k]) == ParameterStatus.KNOWN
         value, sigma = (".1f", ".1f") if unit in OF_ELEMENTS else (".4g", ".2g")
         rows.append(
@@ -51,11 +49,22 @@ def parameter_table(description: Description, estimates: Sequence[Estimate]) -> 
                 shown,
                 ParameterStatus(peak.status[k]).name.lower(),
                 f"{peak.time_ns * 1e-6:.1f}",
-                "" if element is None else f"{peak.crush[element] * 1e3:.0f}",
-                "" if element is None else f"{peak.force[element] * 1e-3:.2f}",
+                "" if element is None else millimetres(peak.crush[element]),
+                "" if element is None else f"{peak.force[element] * per_newton:.2f}",
             )
         )
-    return table(("parameter at peak force", "value", "sigma", "unit", "status", "at ms", "crush mm", "force kN"), rows)
+    head = ("parameter at peak force", "value", "sigma", "unit", "status", "at ms", "crush mm", f"force {force_unit}")
+    return table(head, rows)
+
+
+def millimetres(length: float) -> str:
+    """Of a crush in m: a car's to the millimetre, a small rig's to its third digit."""
+    return f"{length * 1e3:.0f}" if abs(length) >= 0.1 else f"{length * 1e3:.3g}"
+
+
+def unit_of(row: EquationError) -> tuple[str, float]:
+    """The unit in which an equation's signal is shown, and the factor to it."""
+    return readable(row.unit, [PEAK_PER_DEVIATION * np.sqrt(row.input_variance)])
 
 
 def never_touches(name: str) -> str:
@@ -88,7 +97,7 @@ def error_table(errors: Sequence[EquationError]) -> str:
     the error."""
     rows = []
     for row in errors:
-        shown, factor = READABLE[row.unit]
+        shown, factor = unit_of(row)
         share = row.error_variance / row.input_variance if row.input_variance else np.nan
         rows.append(
             (

@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from crash_replay.shown_units import readable
+
 from .core.free_run import Comparison
 from .core.validation import LEVELS, Validation
-from .tables import READABLE, table
+from .tables import table, unit_of
 
 
 def whiteness_table(validation: Validation) -> str:
@@ -47,18 +49,18 @@ def covariance_table(validation: Validation) -> str:
     names = [equation.equation for equation in validation.equations]
     rows = [
         (
-            f"{name} ({READABLE[e.unit][0]})",
+            f"{name} ({unit_of(e)[0]})",
             *(f"{x:.4g}" for x in _shown(validation, k)),
             "",
             *(f"{r:+.2f}" for r in validation.correlation[k]),
         )
-        for k, (name, e) in enumerate(zip(names, validation.equations))
+        for k, (name, e) in enumerate(zip(names, validation.errors))
     ]
     return table(("covariance of the error", *names, "correlation:", *names), rows)
 
 
 def _shown(validation: Validation, row: int) -> np.ndarray:
-    factors = np.array([READABLE[e.unit][1] for e in validation.equations])
+    factors = np.array([unit_of(e)[1] for e in validation.errors])
     return validation.covariance[row] * factors[row] * factors
 
 
@@ -66,7 +68,7 @@ def comparison_table(comparisons: list[Comparison]) -> str:
     """Simulated against measured, with the ISO/TS 18571 rating."""
     rows = []
     for c in comparisons:
-        shown, factor = READABLE.get(c.unit, (c.unit, 1.0))
+        shown, factor = readable(c.unit, [c.measured_peak])
         r = c.rating
         rows.append(
             (

@@ -3,13 +3,17 @@
 Pure functions; none is applied unless asked for. Each says what it did in the test's notes.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 
 import numpy as np
 
+from .channel_class import BY_CLASS, class_of
 from .recording import Recording, RecordingError
+from .shortened import shortened
+from .unique_names import unique
 
 RESTS_AT_ZERO = ("acceleration", "force", "moment", "angular_velocity")
 """Quantities that are zero before the impact; a velocity or displacement then is a fact, not an offset."""
@@ -18,6 +22,8 @@ ENOUGH_SAMPLES = 20
 
 CFC_CLASSES = (60, 180, 600, 1000)
 """Channel frequency classes of SAE J211-1, Hz."""
+IN_NAME = re.compile(r"_cfc(\d+)(?=_\d+$|$)")
+"""As the reader of ISO-MME names a channel that the laboratory filtered."""
 RATE_PER_CFC = 10
 """SAE J211-1: the sample rate is at least ten times the channel frequency class."""
 STEADY = 0.01
@@ -39,10 +45,15 @@ def remove_offset(recording: Recording) -> Recording:
     channels = recording.test.channels
     removed = [f"{c.name} {o:.4g} {c.unit}" for c, o in zip(channels, offset) if np.isfinite(o)]
     kept = [c.name for c, o in zip(channels, offset) if not np.isfinite(o) and c.quantity in RESTS_AT_ZERO]
-    notes = [f"pre-impact mean removed: {', '.join(removed)}"] if removed else []
+    notes = [f"pre-impact mean removed: {shortened(removed)}"] if removed else []
     if kept:
-        notes.append(f"zero offset kept, fewer than {ENOUGH_SAMPLES} samples before time zero: {', '.join(kept)}")
-    return _changed(recording, recording.values - np.nan_to_num(offset), notes)
+        notes.append(f"zero offset kept, fewer than {ENOUGH_SAMPLES} samples before time zero: {shortened(kept)}")
+    recorded = tuple(
+        replace(c, source=_with(c.source, f"offset {o:.4g} {c.unit} removed")) if np.isfinite(o) else c
+        for c, o in zip(channels, offset)
+    )
+    test = replace(recording.test, channels=recorded)
+    return _changed(replace(recording, test=test), recording.values - np.nan_to_num(offset), notes)
 
 
 def cfc_coefficients(cfc: float, sample_period: float) -> tuple[np.ndarray, np.ndarray]:
@@ -86,8 +97,12 @@ def cfc_filter(values: np.ndarray, sample_period: float, cfc: int) -> np.ndarray
     return filtered
 
 
-def filter_recording(recording: Recording, cfc: int) -> Recording:
-    """Every channel through `cfc_filter`. Raises RecordingError also where the sample steps are not equal."""
+def filter_recording(recording: Recording, cfc: int | str) -> Recording:
+    """Every channel through `cfc_filter`, with one class or (`BY_CLASS`) each with its own.
+
+    What was done stands in each channel's source, and a class in its name is corrected. A channel that was filtered
+    with a lower class already stays as it is. Raises RecordingError also where the sample steps are not equal.
+    """
     step = np.diff(recording.time_ns)
     uneven = np.flatnonzero(np.abs(step - np.median(step)) > STEADY * np.median(step)) if len(step) else step
     if len(uneven):
@@ -96,8 +111,40 @@ def filter_recording(recording: Recording, cfc: int) -> Recording:
             f"test {recording.test.id}: a CFC filter needs equal time steps, but the step at {recording.time[k]:.6f} s "
             f"is {step[k] * 1e-6:.6g} ms where most are {np.median(step) * 1e-6:.6g} ms; import it unfiltered"
         )
-    columns = [cfc_filter(column, recording.sample_period, cfc) for column in recording.values.T]
-    return _changed(recording, np.stack(columns, axis=1), [f"filtered with CFC {cfc} (SAE J211-1), all channels"])
+    period = recording.sample_period
+    columns, channels, done = [], [], {}
+    for channel, column in zip(recording.test.channels, recording.values.T):
+        wanted, what = class_of(channel) if cfc == BY_CLASS else (int(cfc), "")
+        had = _class_in_name(channel.name)
+        if had and had <= wanted:
+            outcome = f"left at the CFC {had} that it came with"
+        elif cfc == BY_CLASS and not 0.0 < period * wanted * RATE_PER_CFC <= 1.0 + STEADY:
+            outcome = f"not filtered, CFC {wanted} needs a sample rate of {RATE_PER_CFC * wanted} Hz"
+        else:
+            outcome, column = f"CFC {wanted}", cfc_filter(column, period, wanted)
+            name = IN_NAME.sub(f"_cfc{wanted}", channel.name) if had else channel.name
+            because = f": {what}" if what else ""
+            channel = replace(channel, name=name, source=_with(channel.source, f"CFC {wanted} (SAE J211-1{because})"))
+        columns.append(column)
+        channels.append(channel)
+        done.setdefault(outcome, []).append(channel.name)
+    if list(done) == [f"CFC {cfc}"]:
+        notes = [f"filtered with CFC {cfc} (SAE J211-1), all channels"]
+    else:
+        by = "by channel class" if cfc == BY_CLASS else "by one class"
+        notes = [f"filtered {by} (SAE J211-1), {how}: {shortened(names)}" for how, names in done.items()]
+    test = replace(recording.test, channels=unique(channels))
+    return _changed(replace(recording, test=test), np.stack(columns, axis=1), notes)
+
+
+def _class_in_name(name: str) -> int:
+    """180 of head_ax_cfc180 or head_ax_cfc180_2; 0 for none."""
+    found = IN_NAME.search(name)
+    return int(found[1]) if found else 0
+
+
+def _with(source: str, what: str) -> str:
+    return f"{source}; {what}" if source else what
 
 
 def integrate(
@@ -134,7 +181,7 @@ def select_channels(recording: Recording, patterns: Sequence[str]) -> Recording:
     chosen = [k for k, name in enumerate(names) if any(fnmatchcase(name, pattern) for pattern in patterns)]
     test = replace(recording.test, channels=tuple(recording.test.channels[k] for k in chosen))
     left_out = [name for k, name in enumerate(names) if k not in chosen]
-    notes = [f"left out, not asked for: {', '.join(left_out)}"] if left_out else []
+    notes = [f"left out, not asked for: {shortened(left_out)}"] if left_out else []
     return _changed(Recording(test, recording.time_ns, recording.values[:, chosen]), recording.values[:, chosen], notes)
 
 

@@ -58,6 +58,12 @@ UNPACKED = Range(0, 4 * 2**30, "bytes", "of a bag: its numbers take a tenth of t
 UNPACKED_SMALL, UNPACKED_RATIO = 16_000_000, 100
 """Bytes to which any bag may unpack, and how many times its size a larger one: what sensors say packs 3 to 20 times."""
 
+# of NHTSA's database
+TEST_NUMBER = Range(1, 99_999, "", "the database counts to about 16 000, its files have five digits")
+ANSWER = Range(0, 50_000_000, "bytes", "the metadata of a test of 1000 curves has 1 000 000")
+PACKAGE = Range(0, 500_000_000, "bytes", "a test of 1000 curves packs to 40 000 000")
+PACKED_FILES = Range(0, 5000, "files", "a curve each, and a header")
+
 # of a message
 MESSAGE = Range(0, 64_000_000, "bytes", "a block of 10 000 samples of 800 channels")
 

@@ -19,7 +19,6 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from .bag import read_bag
 from .console import Console, wanted
 from .fault import guarded, tell
 from .health import HealthReport
@@ -27,6 +26,7 @@ from .middleware import prepare_middleware
 from .node_parameters import ParameterError, checked, declare_parameters, names_in
 from .pacing import Outcome, Pacing
 from .player import SECOND, CommandError, Player
+from .readers import read_source
 from .replay_health import replay_health
 from .replay_parameters import LIVE, PARAMETERS, window_of
 from .replay_topics import ReplayTopics
@@ -43,7 +43,7 @@ class ReplayNode(Node):
         super().__init__("replay", automatically_declare_parameters_from_overrides=True)
         self.asked = declare_parameters(self, PARAMETERS, LIVE)
         asked = self.asked
-        recording = select_channels(read_bag(asked["bag"]), names_in(asked["channels"]), names_in(asked["exclude"]))
+        recording = select_channels(read_source(asked["bag"]), names_in(asked["channels"]), names_in(asked["exclude"]))
         window = samples_within(window_of(asked), recording.time_ns)
         player = Player(recording.time_ns, asked["rate"], asked["loop"], *window)
         self.topics = topics = ReplayTopics(

@@ -14,7 +14,9 @@ LIVE = ("rate", "loop", "from", "until")
 
 PARAMETERS = {
     "bag": Allowed(
-        "", "the recording: a rosbag2 folder or one .mcap file", needed="give a recording, --ros-args -p bag:=PATH"
+        "",
+        "the recording: a bag, a CSV with its YAML, an NHTSA EV5 or ISO-MME folder, nhtsa:NUMBER",
+        needed="give a recording, --ros-args -p bag:=PATH",
     ),
     "rate": Allowed(1.0, "times real time; may be set at any time", LOWEST_RATE, HIGHEST_RATE),
     "start_offset": Allowed(0.0, "s after the first sample at which to begin", 0.0, 1e6),

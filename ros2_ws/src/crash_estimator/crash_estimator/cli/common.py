@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from crash_replay.bag import read_bag
 from crash_replay.limits import NUMBER
 from crash_replay.output import check_outputs, write_text
+from crash_replay.readers import read_source
 from crash_replay.recording import Recording, RecordingError
 
 from ..core.effects import EFFECTS
@@ -19,14 +19,16 @@ from ..core.effects.user import load_effects
 from ..core.structure import ModelError
 from ..model_file import model_path
 
+RECORDING = "a recording in any form: bag, CSV with its YAML, NHTSA EV5 or ISO-MME folder, nhtsa:NUMBER"
 
-def read_crash(bag: str) -> Recording:
-    """A bag with something of a crash in it; raises RecordingError where it ends before the impact."""
-    recording = read_bag(bag)
+
+def read_crash(source: str) -> Recording:
+    """A recording of any form with something of a crash in it; raises RecordingError where it ends before the impact."""
+    recording = read_source(source)
     if not recording.time_ns[-1] >= 0:
         end = recording.time_ns[-1] * 1e-6
         raise RecordingError(
-            f"{bag}: its last sample is {-end:.4g} ms before the impact (time zero): there is nothing to learn from"
+            f"{source}: its last sample is {-end:.4g} ms before the impact (time zero): there is nothing to learn from"
         )
     return recording
 

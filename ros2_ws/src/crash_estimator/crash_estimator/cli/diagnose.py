@@ -1,4 +1,4 @@
-"""`diagnose BAG [BAG ...] --model M`: which physical effect is missing from a model, by one or more recordings."""
+"""`diagnose RECORDING [RECORDING ...] --model M`: which physical effect is missing from a model, by one or more recordings."""
 
 import argparse
 import math
@@ -10,7 +10,6 @@ from itertools import permutations
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 
-from crash_replay.bag import read_bag
 from crash_replay.fault import guarded
 from crash_replay.foreign_text import visible
 from crash_replay.output import write_text
@@ -22,7 +21,7 @@ from ..core.structure import EffectSpec, ModelError
 from ..diagnosis_doubt import doubt
 from ..diagnosis_tables import diagnosis_tables
 from ..model_file import load_model, model_path, ready_models
-from .common import add_effects_option, check_written, effects_of, write_json
+from .common import RECORDING, add_effects_option, check_written, effects_of, read_crash, write_json
 
 
 def main() -> None:
@@ -31,7 +30,10 @@ def main() -> None:
 
 def _parser() -> Parser:
     parser = Parser(prog="diagnose", description=__doc__)
-    parser.add_argument("bags", nargs="+", metavar="BAG", help="recordings of one structure, best at different speeds")
+    parser.add_argument(
+        "bags", nargs="+", metavar="RECORDING",
+        help=f"recordings of one structure, best at different speeds; each is {RECORDING}",
+    )  # fmt: skip
     parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
     parser.add_argument("--apply", metavar="NEW_MODEL.yaml", help="write the model with the effects that were found")
     parser.add_argument(
@@ -72,9 +74,8 @@ def run(arguments: argparse.Namespace) -> None:
     check_written(arguments, *arguments.bags, json=arguments.json, apply=arguments.apply)
     effects = effects_of(arguments)
     structure = load_model(arguments.model, effects)
-    found = diagnose(
-        structure, [read_bag(bag) for bag in arguments.bags], effects, arguments.good_enough, arguments.time_limit
-    )
+    recordings = [read_crash(bag) for bag in arguments.bags]
+    found = diagnose(structure, recordings, effects, arguments.good_enough, arguments.time_limit)
     if arguments.json:  # files before words: `| head` ends this at a line that nobody reads
         write_json(arguments.json, found.as_json())
     believed = found.verdict != UNEXPLAINED or arguments.apply_unexplained

@@ -1,4 +1,4 @@
-"""`estimate BAG --model M --method mrls`: fold a recording through an estimator and print what it found."""
+"""`estimate RECORDING --model M --method mrls`: fold a recording through an estimator and print what it found."""
 
 import argparse
 import sys
@@ -15,7 +15,7 @@ from ..core.fold import run
 from ..core.methods import METHODS, make_estimator
 from ..model_file import load_model, ready_models
 from ..tables import besides_table, error_table, known_effects_table, never_touches, parameter_table
-from .common import add_effects_option, check_written, effects_of, parse_settings, read_crash, write_json
+from .common import RECORDING, add_effects_option, check_written, effects_of, parse_settings, read_crash, write_json
 
 
 def main() -> None:
@@ -24,7 +24,7 @@ def main() -> None:
 
 def _parser() -> Parser:
     parser = Parser(prog="estimate", description=__doc__)
-    parser.add_argument("bag", metavar="BAG", help="a recording: rosbag2 folder or .mcap file")
+    parser.add_argument("bag", metavar="RECORDING", help=RECORDING)
     parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
     parser.add_argument("--method", default="constrained_kalman", choices=METHODS)
     parser.add_argument("--set", nargs="*", default=[], metavar="NAME=VALUE", help="settings of the method")

@@ -1,4 +1,4 @@
-"""`simulate BAG --model M`: estimate, then let the model run free from the impact and compare it with the measurement.
+"""`simulate RECORDING --model M`: estimate, then let the model run free from the impact and compare it with the measurement.
 
 With --from OTHER the forces come from another recording: a car with the interior of one test and the structure's
 motion of another, as in section 6.6 of the thesis.
@@ -9,11 +9,11 @@ import sys
 
 import numpy as np
 
-from crash_replay.bag import read_bag
 from crash_replay.conditioning import CFC_CLASSES, cfc_filter
 from crash_replay.fault import guarded
 from crash_replay.recording import Recording
 from crash_replay.said import Parser, say
+from crash_replay.shown_units import readable
 
 from ..core.characteristic import Characteristic, characteristics
 from ..core.effects.applied import applied
@@ -22,9 +22,9 @@ from ..core.free_run import Comparison, FreeRun, compare, free_run
 from ..core.methods import METHODS, make_estimator
 from ..core.structure import ModelError, Structure
 from ..model_file import load_model, ready_models
-from ..tables import table
+from ..tables import millimetres, table
 from ..validation_tables import comparison_table
-from .common import add_effects_option, check_written, effects_of, parse_settings, read_crash, write_json
+from .common import RECORDING, add_effects_option, check_written, effects_of, parse_settings, read_crash, write_json
 
 FILTER = 60
 """CFC of signals that are rated, unless told otherwise: that of a vehicle structure's acceleration (SAE J211-1)."""
@@ -36,7 +36,7 @@ def main() -> None:
 
 def _parser() -> Parser:
     parser = Parser(prog="simulate", description=__doc__.partition("\n\n")[0])
-    parser.add_argument("bag", metavar="BAG", help="a recording: rosbag2 folder or .mcap file")
+    parser.add_argument("bag", metavar="RECORDING", help=RECORDING)
     parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
     parser.add_argument("--method", default="constrained_kalman", choices=[m for m in METHODS if m != "effective_mass"])
     parser.add_argument("--set", nargs="*", default=[], metavar="NAME=VALUE", help="settings of the method")
@@ -65,7 +65,7 @@ def simulate(arguments: argparse.Namespace) -> None:
     description, structure = estimator.description, applied(model, recording.test, effects)
     laws = characteristics(structure, description, estimates)
     if arguments.source:
-        other = read_bag(arguments.source)
+        other = read_crash(arguments.source)
         donor = make_estimator(model, other.test, arguments.method, **settings)
         laws = characteristics(structure, donor.description, run(donor, other.samples()))
     simulated = free_run(structure, description, estimates, laws, arguments.end)
@@ -92,21 +92,18 @@ def smoother(recording: Recording, cfc: int | None):
 
 
 def characteristic_table(laws: tuple[Characteristic, ...]) -> str:
+    unit, factor = readable("N", [float(np.abs(law.force).max()) for law in laws])
+    slope_unit, per_slope = readable("N/m", [law.unloading or 0.0 for law in laws])
     rows = []
     for law in laws:
-        k = int(np.argmax(np.abs(law.force)))
-        slope = "elastic" if law.unloading is None else f"{law.unloading * 1e-3:.0f}"
+        size = np.abs(law.force)
+        k = len(size) - 1 - int(np.argmax(size[::-1]))  # of two sides that are alike the one in compression
+        slope = "elastic" if law.unloading is None else f"{law.unloading * per_slope:.0f}"
+        largest = f"{law.force[k] * factor:.2f}"
         rows.append(
-            (
-                law.element,
-                f"{law.crush.max() * 1e3:.0f}",
-                f"{law.force[k] * 1e-3:.2f}",
-                f"{law.crush[k] * 1e3:.0f}",
-                slope,
-                f"{law.damping:.0f}",
-            )
+            (law.element, millimetres(law.crush.max()), largest, millimetres(law.crush[k]), slope, f"{law.damping:.0f}")
         )
-    head = ("force over crush of", "crush mm", "largest kN", "at mm", "unloading kN/m", "damping N s/m")
+    head = ("force over crush of", "crush mm", f"largest {unit}", "at mm", f"unloading {slope_unit}", "damping N s/m")
     return table(head, rows)
 
 

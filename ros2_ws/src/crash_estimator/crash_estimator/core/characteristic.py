@@ -92,14 +92,20 @@ def _characteristic(
     damping = float(np.sum((damper * rate**2)[~apart])) / squares if squares else element.damping.value
     if element.stiffness.shape == "constant" and element.unloading is None:
         stiffness = after[-1].parameters[description.parameters.index(f"{element.name}.stiffness")]
-        reach = np.array([-1.0, 0.0, 1.0]) * max(float(np.abs(crush).max(initial=0.0)), 1e-3)
-        return Characteristic(element.name, reach, stiffness * reach, None, damping, element.tension, True)
+        reach = np.array([-1.0, 0.0, 1.0]) * (float(np.abs(crush).max(initial=0.0)) or 1e-3)
+        force = _as_it_can(element, stiffness * reach)
+        return Characteristic(element.name, reach, force, None, damping, element.tension, True)
     slope = _unloading(element, crush, force)
     if slope is None:  # all samples lie on one curve, in tension too
         x, f = _curve(crush[~apart], force[~apart])
     else:
         x, f = _curve(*(values[_largest_so_far(crush) & ~apart] for values in (crush, force)))
-    return Characteristic(element.name, x, f, slope, damping, element.tension)
+    return Characteristic(element.name, x, _as_it_can(element, f), slope, damping, element.tension)
+
+
+def _as_it_can(element: Element, force: np.ndarray) -> np.ndarray:
+    """The force without what noise makes of it below zero: a contact that carries no tension pushes or does nothing."""
+    return force if element.tension else np.maximum(force, 0.0)
 
 
 def _largest_so_far(crush: np.ndarray) -> np.ndarray:

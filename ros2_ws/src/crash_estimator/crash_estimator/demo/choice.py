@@ -7,8 +7,9 @@ from textwrap import fill
 from typing import NamedTuple
 
 from crash_replay.bag import write_bag
+from crash_replay.channel_class import BY_CLASS
 from crash_replay.conditioning import filter_recording
-from crash_replay.readers import read_source
+from crash_replay.readers import is_bag, name_of, read_source
 from crash_replay.recording import Recording, RecordingError, Test
 
 from ..core.structure import ModelError, Structure
@@ -17,7 +18,6 @@ from ..model_file import load_model, ready_models
 BUNDLED = Path("bags/hidden_effect.mcap")
 METHODS_OF_ONE_MODEL = ("mrls", "constrained_kalman")
 METHOD_OF_SEVERAL_MODELS = "constrained_kalman"
-CFC_OF_VEHICLES = 60
 WALL_TIME = 15.0
 """s that a replay takes by default: long enough to watch, short enough to wait for."""
 
@@ -41,23 +41,21 @@ def bundled_recording() -> Path:
     )
 
 
-def as_bag(source: Path, out: Path, cfc: int | None = None) -> tuple[Recording, Path, list[str]]:
+def as_bag(source: Path, out: Path, cfc: int | str | None = None) -> tuple[Recording, Path, list[str]]:
     """The recording at `source`, a bag of it, and what was done to get it, in lines.
 
     A bag stays where and as it is; any other form is imported to out/NAME.mcap. `cfc`: its channel frequency class
-    of SAE J211-1, 0 for none; without it a laboratory's folder, which is recorded unfiltered, is filtered with CFC 60,
-    the class for the motion of vehicles and the force on a barrier.
+    of SAE J211-1, 0 for none; without it what a laboratory recorded, which is unfiltered, is filtered, each channel with
+    its own class.
     """
     recording = read_source(source)
-    if source.suffix == ".mcap" or any(source.glob("*.mcap")):
+    if is_bag(source):
         return recording, source, []
     if cfc is None:
-        cfc = CFC_OF_VEHICLES if source.is_dir() else 0
+        cfc = 0 if source.is_file() else BY_CLASS
     if cfc:
         recording = filter_recording(recording, cfc)
-    bag = write_bag(
-        recording, out / f"{source.stem if source.is_file() else source.resolve().name}.mcap", overwrite=True
-    )
+    bag = write_bag(recording, out / f"{name_of(source)}.mcap", overwrite=True)
     notes = recording.test.notes or ("as it is",)
     lines = [fill(note, 110, initial_indent="  ", subsequent_indent="    ") for note in notes]
     return recording, bag, [f"imported {source} to {bag}:", *lines]

@@ -1,7 +1,7 @@
 """`demo`: a recording replayed, estimated, what its model lacks named and added, and all of it shown, in one command.
 
 make demo                                    a simulated test with an effect that its model has not got
-make demo RECORDING=../data/nhtsa-10146      one of your own: a bag, CSV with YAML, an NHTSA or ISO-MME folder
+make demo RECORDING=nhtsa:10146              a real one: a bag, CSV with YAML, an NHTSA or ISO-MME folder, nhtsa:NUMBER
 """
 
 import argparse
@@ -10,6 +10,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from crash_replay.channel_class import BY_CLASS, frequency_class
 from crash_replay.conditioning import CFC_CLASSES
 from crash_replay.fault import guarded
 from crash_replay.recording import Recording
@@ -55,7 +56,8 @@ def _parser() -> Parser:
     )
     parser.add_argument(
         "--recording", type=Path, metavar="PATH",
-        help="a bag, or what `import` reads: CSV with YAML, NHTSA EV5 or ISO-MME folder (default: a simulated one)",
+        help="a bag, or what `import` reads: CSV with YAML, NHTSA EV5 or ISO-MME folder, nhtsa:NUMBER"
+        " (default: a simulated one)",
     )  # fmt: skip
     parser.add_argument(
         "--model", action="append", default=[], metavar="M",
@@ -65,9 +67,9 @@ def _parser() -> Parser:
         "--method", action="append", default=[], choices=METHODS, help="may be repeated: they run side by side"
     )
     parser.add_argument(
-        "--cfc", type=int, choices=(0, *CFC_CLASSES),
-        help="filter what is imported with this class of SAE J211-1, 0: not (default: not,"
-        " or 60 for a laboratory's folder with --no-diagnosis)",
+        "--cfc", type=frequency_class, choices=(0, BY_CLASS, *CFC_CLASSES),
+        help="filter what is imported with this class of SAE J211-1, `class`: each channel with its own, 0: not"
+        " (default: not, or `class` for a laboratory's folder with --no-diagnosis)",
     )  # fmt: skip
     parser.add_argument(
         "--with", dest="others", type=Path, action="append", default=[], metavar="PATH",

@@ -8,13 +8,14 @@ from itertools import count
 from pathlib import Path
 
 from crash_replay.output import named
+from crash_replay.readers import name_of
 
 
 @contextmanager
 def claim(out: Path, source: Path) -> Iterator[Path]:
     """out/NAME, by the recording's name, or out/NAME-2 and so on while another demonstration has it, or where it is the
     recording itself. Raises OutputError where it cannot be made."""
-    name = source.resolve().name if source.is_dir() else source.stem
+    name = name_of(source)
     for k in count(1):
         folder = out / (name if k == 1 else f"{name}-{k}")
         with named(folder):

@@ -9,6 +9,8 @@ from ..recording import Recording, RecordingError
 from . import csv_yaml, isomme, nhtsa
 from .description import apply_names
 
+NHTSA = "nhtsa:"
+
 
 class Reader(NamedTuple):
     """A format: how it is recognised and read, and which options it takes."""
@@ -19,25 +21,26 @@ class Reader(NamedTuple):
     options: tuple[str, ...] = ()
 
 
-def _is_bag(path: Path) -> bool:
+def is_bag(path: Path) -> bool:
+    """A rosbag2 folder or an .mcap file, as far as its names tell."""
     return path.suffix == ".mcap" or (path.is_dir() and ((path / "metadata.yaml").exists() or any(path.glob("*.mcap"))))
 
 
 READERS = (
     Reader("a .csv file with a .yaml of the same name beside it", csv_yaml.found, csv_yaml.read),
-    Reader("a folder with an .EV5 header", nhtsa.found, nhtsa.read, ("cells",)),
-    Reader("a folder with an .mme header", isomme.found, isomme.read),
-    Reader("a bag (a rosbag2 folder or an .mcap file)", _is_bag, read_bag, ("recover",)),
+    Reader("a folder with an .EV5 header", nhtsa.found, nhtsa.read, ("cells", "all_sensors")),
+    Reader("a folder with an .mme header", isomme.found, isomme.read, ("all_sensors",)),
+    Reader("a bag (a rosbag2 folder or an .mcap file)", is_bag, read_bag, ("recover",)),
 )
 
 
 def read_source(path: str | Path, names: str | Path | None = None, **options: Any) -> Recording:
-    """The recording at `path`, in whichever format it is; `options` that are None or False are not given.
+    """The recording at `path` (or of NHTSA's test `nhtsa:NUMBER`), in whichever format it is; `options` that are None or False are not given.
 
     `names` is a YAML file that renames channels and sets bodies (see `description.Names`); without it,
     `import.yaml` in the folder does. Raises RecordingError with one readable line.
     """
-    path = Path(path)
+    path = _folder_or_file(path)
     reader = _reader_for(path)
     given = {option: value for option, value in options.items() if value not in (None, False)}
     for option in given:
@@ -50,6 +53,22 @@ def read_source(path: str | Path, names: str | Path | None = None, **options: An
     if names is None and path.is_dir() and beside.is_file():
         names = beside
     return apply_names(recording, Path(names)) if names else recording
+
+
+def name_of(source: str | Path) -> str:
+    """What files made of a recording are called after: crash of crash.csv, nhtsa-10146 of nhtsa:10146."""
+    if str(source).startswith(NHTSA):
+        return str(source).replace(":", "-")
+    path = Path(source)
+    return path.resolve().name if path.is_dir() else path.stem
+
+
+def _folder_or_file(source: str | Path) -> Path:
+    if not str(source).startswith(NHTSA):
+        return Path(source)
+    from ..nhtsa_database.by_number import folder_of  # takes the HTTP client, which no other source needs
+
+    return folder_of(str(source))
 
 
 def _reader_for(path: Path) -> Reader:

@@ -43,8 +43,14 @@ class Header(NamedTuple):
     laboratory: str
     configuration: str  # VTB: vehicle into barrier, ...
     closing_speed: float  # km/h
+    impact_angle: float  # degrees between the vehicles' long axes
     masses: dict[int, float]  # vehicle -> test mass in kg
     curves: tuple[Curve, ...]
+
+    @property
+    def along_one_line(self) -> bool:
+        """Whether two vehicles meet head on or one from behind: only then their x axes lie on one line."""
+        return min(self.impact_angle % 180.0, -self.impact_angle % 180.0) < SMALL_ANGLE
 
 
 INDEX = Range(-1e8, 1e8, "", "of a sample: ten seconds at 10 MHz")
@@ -59,6 +65,8 @@ NUMERIC = {
 }
 """A curve's fields that are numbers, of what kind, and what they may be."""
 TEST_FIELDS = 20
+SMALL_ANGLE = 1.0
+"""Degrees: its cosine is one within 0.02 %."""
 TEST_MASS = Range(0, 1e6, "kg", "0 where it is not stated")
 
 
@@ -92,6 +100,7 @@ def read_header(path: Path) -> Header:
         laboratory=test[4],
         configuration=test[8],
         closing_speed=_number(path, line, "closing speed", test[14], SPEED),
+        impact_angle=_angle(test[15]),
         masses={
             int(_number(path, n, "vehicle", f[0], NUMERIC["vehicle"][1])): _number(
                 path, n, "test mass", f[10], TEST_MASS
@@ -119,6 +128,15 @@ def _curve(path: Path, line: int, fields: Sequence[str]) -> Curve:
     for name, (kind, limit) in NUMERIC.items():
         given[name] = kind(_number(path, line, name, given[name], limit))
     return Curve(**given)
+
+
+def _angle(text: str) -> float:
+    """Degrees; 0 where it is not stated, as for a barrier."""
+    try:
+        angle = float(text)
+    except ValueError:
+        return 0.0
+    return angle if abs(angle) <= 360.0 else 0.0
 
 
 def _number(path: Path, line: int, what: str, text: str, limit: Range) -> float:

@@ -1,25 +1,32 @@
 """ISO-MME folder (ISO/TS 13499): NAME.mme says what the test is, Channel/NAME.001, ... hold a channel each.
 
-Every file starts with lines `Key   :value`; in a channel file the values follow, one a line. Their time
-is a start and a step, or another channel's values ("explicit").
+Every file starts with lines `Key   :value`; in a channel file the values follow, one a line, NOVALUE where there is
+none. Their time is a start and a step, or another channel's values ("explicit"). A file at fault costs only itself.
 """
 
+import math
 import re
 from array import array
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from .. import limits
+from ..progress import with_progress
 from ..recording import Channel, Recording, RecordingError, Test
+from ..shortened import shortened
+from ..unique_names import unique
+from .body_means import Sensor, body_motion
 from .isomme_codes import channel_of, is_time
 from .units import si_factor
 
+NO_VALUE = "NOVALUE"
 FAILED = ("channel failed", "system failed", "meaningless data", "no data")
+LASTS = 0.8
+"""Share of the record that a body's motion must be known for."""
 SAME_BASE = 0.75
 """Samples of one rate that leave less than this share of their step between them lie on two time bases."""
 
@@ -34,7 +41,7 @@ class MmeFile(NamedTuple):
     def get(self, key: str) -> str:
         """The value of a key, "" where there is none."""
         value = self.header.get(key, "")
-        return "" if value.upper() == "NOVALUE" else value
+        return "" if value.upper() == NO_VALUE else value
 
     def number(self, key: str, limit: limits.Range) -> float:
         try:
@@ -71,34 +78,43 @@ def _named(folder: Path, pattern: str) -> list[Path]:
     return sorted(entry for entry in folder.iterdir() if re.fullmatch(pattern, entry.name, re.IGNORECASE))
 
 
-def read(path: Path) -> Recording:
-    """The recording. Raises RecordingError where the header is at fault or no channel can be used."""
+def read(path: Path, all_sensors: bool = False) -> Recording:
+    """The recording; with `all_sensors` also those that contradict the others of their body. Raises RecordingError where the header is at fault or no channel can be used."""
     headers = _named(path, r".*\.mme")
     if len(headers) != 1:
         raise RecordingError(f"{path}: expected one .mme header, found {', '.join(file.name for file in headers)}")
     header = _read_file(headers[0])
     folder = next(iter(_named(path, "channel")), path)
-    files = [_read_file(file) for file in _named(folder, r".*\.\d{3,}")]
-    if not files:
+    named = _named(folder, r".*\.\d{3,}")
+    if not named:
         raise RecordingError(f"{folder}: no channel files (NAME.001, NAME.002, ...)")
-    tracks, notes = _tracks(files)
+    files, notes = [], []
+    for file in with_progress(named, "reading channel"):
+        try:
+            files.append(_read_file(file))
+        except RecordingError as why:
+            notes.append(f"left out, {file.name}: {str(why).removeprefix(f'{file}:').strip()}")
+    tracks = _tracks(files, notes)
     if not tracks:
         raise RecordingError(f"{path}: no channel can be used: {'; '.join(notes)}")
     tracks, time_ns, values = _common_time(path, tracks, notes)
-    if any(track.code[0] == "B" and track.channel.quantity == "force" for track in tracks):
+    channels = unique([track.channel for track in tracks])
+    if any(_on_barrier(track.code, channel) for track, channel in zip(tracks, channels)):
         notes.append("barrier forces keep their recorded sign; a model expects compression to be positive")
+    made, outliers = _made_of_several(header, tracks, channels, time_ns, values, notes)
+    columns = made | {c: v for c, v in zip(channels, values.T) if all_sensors or c.name not in outliers}
     source = [header.get("laboratory name"), header.get("date of the test"), headers[0].name]
     velocity = _initial_velocity(header, tracks, notes)
     try:
         test = Test(
             id=header.get("test number") or header.get("laboratory test ref. number") or headers[0].stem,
-            channels=_unique([track.channel for track in tracks]),
+            channels=tuple(columns),
             title=header.get("title") or header.get("type of the test") or header.get("test type"),
             source=", ".join(filter(None, source)),
             initial_velocity=velocity,
             notes=tuple(notes),
         )
-        return Recording(test, time_ns, values)
+        return Recording(test, time_ns, np.stack(list(columns.values()), axis=1))
     except RecordingError as error:
         raise RecordingError(f"{path}: {error}") from None
 
@@ -118,23 +134,23 @@ def _read_file(file: Path) -> MmeFile:
     values = array("d")
     for number, line in enumerate(lines, start=1):
         key, colon, value = line.partition(":")
-        if colon and not values:
+        if colon and not len(values):
             header.setdefault(key.strip().lower(), value.strip())
         elif line.strip() and file.suffix.lower() != ".mme":
             try:
-                values.append(float(line))
+                values.append(math.nan if line.strip().upper() == NO_VALUE else float(line))
             except ValueError:
                 raise RecordingError(
-                    f"{file}:{number}: expected a number, found {limits.shown(line.strip())}"
+                    f"{file}: line {number}: expected a number, found {limits.shown(line.strip())}"
                 ) from None
     return MmeFile(file, header, np.array(values))
 
 
-def _tracks(files: Sequence[MmeFile]) -> tuple[list[Track], list[str]]:
-    """The usable channels, and a note for each of the others."""
+def _tracks(files: Sequence[MmeFile], notes: list[str]) -> list[Track]:
+    """The usable channels; a note for each of the others."""
     by_code = {file.code: file for file in files}
     several = len({code[:1] for code in by_code if code[:1].isdigit()}) > 1
-    tracks, notes = [], []
+    tracks = []
     for file in files:
         if is_time(file.code):
             continue
@@ -148,7 +164,7 @@ def _tracks(files: Sequence[MmeFile]) -> tuple[list[Track], list[str]]:
             tracks.append(Track(file.code, channel, _time_ns(file, by_code), values))
         except RecordingError as why:
             notes.append(f"left out, {file.file.name}: {why}")
-    return tracks, notes
+    return tracks
 
 
 def _time_ns(file: MmeFile, by_code: Mapping[str, MmeFile]) -> np.ndarray:
@@ -178,7 +194,7 @@ def _common_time(path: Path, tracks: Sequence[Track], notes: list[str]) -> tuple
     used = [track for track in tracks if track.step == step]
     others = [track.channel.name for track in tracks if track.step != step]
     if others:
-        notes.append(f"left out, sampled at another rate than {1e9 / max(step, 1):g} Hz: {', '.join(others)}")
+        notes.append(f"left out, sampled at another rate than {1e9 / max(step, 1):g} Hz: {shortened(others)}")
     time_ns = np.unique(np.concatenate([track.time_ns for track in used]))
     if len(time_ns) > 1 and np.median(np.diff(time_ns)) < SAME_BASE * step:
         raise RecordingError(
@@ -194,15 +210,46 @@ def _common_time(path: Path, tracks: Sequence[Track], notes: list[str]) -> tuple
     return used, time_ns, values
 
 
-def _unique(channels: Sequence[Channel]) -> tuple[Channel, ...]:
-    """Where a second channel has the same name it gets `_2` and so on."""
-    taken: Counter[str] = Counter()
-    unique = []
-    for channel in channels:
-        taken[channel.name] += 1
-        number = taken[channel.name]
-        unique.append(channel if number == 1 else replace(channel, name=f"{channel.name}_{number}"))
-    return tuple(unique)
+def _on_barrier(code: str, channel: Channel) -> bool:
+    return code[0] == "B" and channel.quantity == "force"
+
+
+def _made_of_several(
+    header: MmeFile, tracks: Sequence[Track], channels: Sequence[Channel], time_ns: np.ndarray, values: np.ndarray,
+    notes: list[str],
+) -> tuple[dict[Channel, np.ndarray], tuple[str, ...]]:  # fmt: skip
+    """`barrier_fx` of several cells, and the motion of cars and engines; names of the sensors that contradict others."""
+    made, barrier = {}, None
+    cells = [k for k, t in enumerate(tracks) if _on_barrier(t.code, channels[k]) and channels[k].axis == "x"]
+    names = [channel.name for channel in channels]
+    if len(cells) > 1 and "barrier_fx" not in names:
+        total = values[:, cells].sum(axis=1)
+        # the structure only pushes, so the larger side of the sum is compression
+        turn = -1.0 if -np.nanmin(total, initial=0.0) > np.nanmax(total, initial=0.0) else 1.0
+        barrier = turn * total
+        sign = "sign turned" if turn < 0 else "sign as recorded"
+        made[Channel("barrier_fx", "force", "barrier", "x", f"sum of {len(cells)} load cells, {sign}")] = barrier
+        notes.append(f"barrier_fx: sum of {len(cells)} cells; positive in compression: {sign}")
+    sensors = [
+        Sensor(channel, column)
+        for channel, column in zip(channels, values.T)
+        if (channel.quantity, channel.axis) == ("acceleration", "x")
+        and channel.body.endswith(("car", "engine"))
+        and np.isfinite(column).mean() >= LASTS
+    ]
+    motion = body_motion(time_ns * 1e-9, sensors, _masses(header, tracks), barrier)
+    notes += motion.notes
+    return dict(motion.columns) | made, motion.outliers
+
+
+def _masses(header: MmeFile, tracks: Sequence[Track]) -> dict[str, float]:
+    """kg by body, of the test objects whose mass the header gives."""
+    masses = {}
+    for track in tracks:
+        stated = header.get(f"mass test object {track.code[0].lower()}")
+        if track.channel.body.endswith("car") and re.fullmatch(r"\d+(\.\d+)?", stated) and float(stated) > 0:
+            masses[track.channel.body] = float(stated)
+    return masses
 
 
 def _initial_velocity(header: MmeFile, tracks: Sequence[Track], notes: list[str]) -> dict[str, float]:
@@ -221,5 +268,5 @@ def _initial_velocity(header: MmeFile, tracks: Sequence[Track], notes: list[str]
             bodies = dict.fromkeys(track.channel.body for track in tracks if track.code[0] == test_object[1])
             velocity |= dict.fromkeys(bodies, speed)
             if bodies:
-                notes.append(f"initial velocity {speed:.4g} m/s along the object's own x: {', '.join(bodies)}")
+                notes.append(f"initial velocity {speed:.4g} m/s along the object's own x: {shortened(list(bodies))}")
     return velocity

@@ -21,13 +21,14 @@ LOCATIONS = {
     "TRRI": "rib", "THSP": "spine", "LUSP": "lumbar_spine", "ABDO": "abdomen", "PELV": "pelvis", "FEMR": "femur",
     "KNEE": "knee", "TIBI": "tibia", "FOOT": "foot", "VEHC": "car", "ENGN": "engine", "DOOR": "door", "SILL": "sill",
     "APIL": "a_pillar", "BPIL": "b_pillar", "CPIL": "c_pillar", "CRME": "crossmember", "SEAT": "seat", "TUNN": "tunnel",
+    "FLOR": "floor", "FOOR": "floor", "SPIN": "spine", "STWH": "steering_wheel", "STCL": "steering_column",
 }  # fmt: skip
 FINE = {
     "LE": "left", "RI": "right", "UP": "upper", "LO": "lower", "MI": "middle", "FR": "front", "RE": "rear",
     "CG": "", "00": "",
 }  # fmt: skip
-CAR = ("VEHC", "TUNN", "CRME")
-"""Locations that move with the passenger cell."""
+MOVES_WITH = dict.fromkeys(("VEHC", "TUNN", "CRME", "FLOR", "SILL"), "car") | {"ENGN": "engine"}
+"""Locations that move with a body that has several: the passenger cell, the engine."""
 FILTERED = {"A": "cfc1000", "B": "cfc600", "C": "cfc180", "D": "cfc60"}
 """Filter classes that stand for a CFC; the others say prefiltered or nothing."""
 
@@ -49,7 +50,8 @@ def channel_of(code: str, source: str, several_objects: bool) -> Channel:
     fine = [FINE.get(part, part.replace("?", "").lower()) for part in (code[6:8], code[8:10])]
     place = [*owner, LOCATIONS.get(code[2:6], code[2:6].replace("?", "").lower()), *fine]
     axis = code[14].lower() if code[14] in "XYZ" else ""
-    moves_with = {"B": ["barrier"]}.get(code[0], [of_object, "car"] if code[2:6] in CAR else place)
+    moves_with = [of_object, MOVES_WITH[code[2:6]]] if code[2:6] in MOVES_WITH else place
+    moves_with = ["barrier"] if code[0] == "B" else moves_with
     return Channel(
         _joined(*place, letter + axis, FILTERED.get(code[15], "")), quantity, _joined(*moves_with), axis, source
     )

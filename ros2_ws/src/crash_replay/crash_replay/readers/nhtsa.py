@@ -1,27 +1,35 @@
 """NHTSA crash test folder: an EV5 header and one file for each curve (two columns: time in s, value).
 
 Made of the curves: `barrier_fx`, the sum of the barrier's load cells, positive in compression, and
-`car_ax`, `engine_ax`, the mean of each body's accelerometers along x. What is left out, and why, is in
-the test's notes.
+`car_ax`, `engine_ax`, the mean of each body's accelerometers along x, without those that contradict the others
+(`body_means`). What is left out, and why, is in the test's notes.
 """
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from .. import limits
+from ..progress import with_progress
 from ..recording import Channel, Recording, RecordingError, Test
+from ..shortened import shortened
+from .body_means import BodyMotion, Sensor, body_motion
 from .ev5 import Curve, Header, read_header
+from .ev5_codes import location_of
+from .left_out import summary
 from .nhtsa_names import axis_of, body_of, channel_names
 from .units import KMH, quantity_of, si_factor
 
 VALID_UNTIL = re.compile(r"no valid data after (\d+(?:\.\d+)?) *ms", re.IGNORECASE)
 ON_GRID = 0.01
 """Share of the sample period by which a file's times may be off the header's."""
+
+LASTS = 0.8
+"""Share of the record that a body's motion must be known for."""
 
 
 class Track(NamedTuple):
@@ -51,8 +59,9 @@ def found(path: Path) -> bool:
     return path.is_dir() and bool(_headers(path))
 
 
-def read(path: Path, cells: bool = False) -> Recording:
-    """The recording; with `cells`, the barrier's load cells are channels of their own as well.
+def read(path: Path, cells: bool = False, all_sensors: bool = False) -> Recording:
+    """The recording; with `cells`, the barrier's load cells are channels of their own as well; with `all_sensors`, those
+    that contradict the others of their body too.
 
     Raises RecordingError where the header is at fault or no curve can be used; a curve at fault is left out.
     """
@@ -73,14 +82,20 @@ def read(path: Path, cells: bool = False) -> Recording:
     if wrong := limits.size_wrong(end - start, len(tracks)):
         raise RecordingError(f"{path}: from the first sample of any curve to the last, the test {wrong}")
 
-    columns, notes = _body_means(tracks, start, end)
+    time_ns = np.rint(np.arange(start, end) * (step * 1e3)).astype(np.int64)
     barrier, of_barrier = _barrier(header, tracks, start, end, keep_cells=cells)
-    columns |= barrier
-    columns |= {track.channel: track.on(start, end) for track in tracks if track.curve.vehicle != 0}
-    notes = [*_about(header), *notes, *of_barrier, *_short(columns, start, step), *_summary(left_out)]
+    force = next((values for channel, values in barrier.items() if channel.name == "barrier_fx"), None)
+    motion = _body_motion(header, tracks, start, time_ns, force)
+    dropped = () if all_sensors else motion.outliers
+    columns = dict(motion.columns) | barrier
+    columns |= {
+        track.channel: track.on(start, end)
+        for track in tracks
+        if track.curve.vehicle != 0 and track.channel.name not in dropped
+    }
+    notes = [*_about(header), *motion.notes, *of_barrier, *_short(columns, start, step), *_summary(left_out)]
     if not columns:
         raise RecordingError(f"{path}: no curve but of the barrier's cells, and their sum cannot be made")
-    time_ns = np.rint(np.arange(start, end) * (step * 1e3)).astype(np.int64)
     try:
         test = Test(
             id=header.number,
@@ -103,7 +118,8 @@ def _read_tracks(header_file: Path, header: Header) -> tuple[list[Track], list[t
     """The usable curves, and the others with the reason why they are not."""
     tracks, left_out = [], []
     vehicles = len(header.masses)
-    for curve, name in zip(header.curves, channel_names(header.curves, vehicles)):
+    named = list(zip(header.curves, channel_names(header.curves, vehicles)))
+    for curve, name in with_progress(named, "reading curve"):
         try:
             tracks.append(_read_track(header_file, curve, name, body_of(curve, vehicles)))
         except Unusable as why:
@@ -154,25 +170,30 @@ def _table(file: Path) -> np.ndarray:
     return table
 
 
-def _body_means(tracks: Sequence[Track], start: int, end: int) -> tuple[dict[Channel, np.ndarray], list[str]]:
-    """`car_ax`, `engine_ax`: the mean of a body's accelerometers along x that last from start to end."""
-    columns, notes, taken = {}, [], {track.channel.name for track in tracks}
+def _body_motion(
+    header: Header, tracks: Sequence[Track], start: int, time_ns: np.ndarray, barrier: np.ndarray | None
+) -> BodyMotion:
+    """Of every body's accelerometers along x that last as long as its longest."""
+    end = start + len(time_ns)
     bodies: dict[str, list[Track]] = {}
     for track in tracks:
-        along_x = track.channel.quantity == "acceleration" and track.channel.axis == "x"
-        if along_x and (track.first, track.end) == (start, end):
+        if track.channel.quantity == "acceleration" and track.channel.axis == "x" and track.curve.vehicle != 0:
             bodies.setdefault(track.channel.body, []).append(track)
-    for body, members in bodies.items():
-        name = f"{body}_ax"
-        if name not in taken:
-            of = ", ".join(member.channel.name for member in members)
-            curves = ", ".join(str(member.curve.number) for member in members)
-            channel = Channel(
-                name, "acceleration", body, "x", ("mean of curves " if len(members) > 1 else "curve ") + curves
-            )
-            columns[channel] = np.mean([member.values for member in members], axis=0)
-            notes.append(f"{name}: mean of {of}" if len(members) > 1 else f"{name}: is {of}")
-    return columns, notes
+    sensors, numbers = [], {}
+    for members in bodies.values():
+        longest = max(members, key=lambda track: len(track.values))
+        if len(longest.values) < LASTS * len(time_ns):
+            continue
+        for track in members:
+            if (track.first, track.end) == (longest.first, longest.end):
+                near = location_of(track.curve.location, track.curve.comment).near
+                sensors.append(Sensor(track.channel, track.on(start, end), near))
+                numbers[track.channel] = f"curve {track.curve.number}"
+    vehicles = len(header.masses)
+    cars = {f"vehicle{k}_car" if vehicles > 1 else "car": mass for k, mass in header.masses.items() if mass > 0}
+    if vehicles > 1 and not header.along_one_line:
+        cars = {}
+    return body_motion(time_ns * 1e-9, sensors, cars, barrier, lambda sensor: numbers[sensor.channel])
 
 
 def _barrier(
@@ -180,15 +201,15 @@ def _barrier(
 ) -> tuple[dict[Channel, np.ndarray], list[str]]:
     """`barrier_fx`, the sum of the cells' Fx, positive in compression; the cells too where they are asked for."""
     listed = [curve for curve in header.curves if _is_cell_force(curve)]
-    used = [t for t in tracks if _is_cell_force(t.curve) and (t.first, t.end) == (start, end)]
+    used = _of_one_span([track for track in tracks if _is_cell_force(track.curve)])
     if not used:
         return {}, [f"barrier_fx: none of the {len(listed)} cells can be used"] if listed else []
-    total = np.sum([track.values for track in used], axis=0)
+    total = np.sum([track.on(start, end) for track in used], axis=0)
     # the structure only pushes, so the larger side of the sum is compression
-    turn = -1.0 if -total.min() > total.max() else 1.0
+    turn = -1.0 if -np.nanmin(total) > np.nanmax(total) else 1.0
     missing = sorted({curve.number for curve in listed} - {track.curve.number for track in used})
     cells = {curve.number: curve.comment.split(":")[0] for curve in listed}
-    without = ", ".join(f"{cells[number]} (curve {number})" for number in missing)
+    without = shortened([f"{cells[number]} (curve {number})" for number in missing])
     text = f"sum of {len(used)} of {len(listed)} cells" + (f", without {without}" if without else "")
     sign = "sign turned, the cells read negative in compression" if turn < 0 else "sign as recorded"
     channel = Channel("barrier_fx", "force", "barrier", "x", f"sum of {len(used)} load cells, {sign}")
@@ -199,6 +220,13 @@ def _barrier(
     elif others:
         text += f"; the cells themselves ({len(others)} curves) are left out"
     return columns, [f"barrier_fx: {text}; positive in compression: {sign}"]
+
+
+def _of_one_span(cells: Sequence[Track]) -> list[Track]:
+    """Those that begin and end as most do: a sum needs all of its parts."""
+    spans = Counter((track.first, track.end) for track in cells)
+    most = max(spans, key=lambda span: (spans[span], span[1] - span[0]), default=None)
+    return [track for track in cells if (track.first, track.end) == most]
 
 
 def _is_cell_force(curve: Curve) -> bool:
@@ -235,7 +263,7 @@ def _short(columns: dict[Channel, np.ndarray], start: int, step: float) -> list[
     return notes
 
 
-def _summary(left_out: Iterable[tuple[Curve, str]]) -> list[str]:
+def _summary(left_out: Sequence[tuple[Curve, str]]) -> list[str]:
     """One note for each reason: ranges of curves, the barrier's many moments as a number."""
     reasons: dict[str, list[Curve]] = {}
     for curve, why in left_out:
@@ -244,18 +272,5 @@ def _summary(left_out: Iterable[tuple[Curve, str]]) -> list[str]:
     for why, curves in reasons.items():
         moments = sum(curve.vehicle == 0 and quantity_of(curve.unit) == "moment" for curve in curves)
         numbers = [c.number for c in curves if not (c.vehicle == 0 and quantity_of(c.unit) == "moment")]
-        parts = [f"curves {_ranges(numbers)}"] if numbers else []
-        parts += [f"{moments} barrier cell moments"] if moments else []
-        notes.append(f"left out, {why}: {' and '.join(parts)}")
+        notes.append(summary(why, numbers, f"{moments} barrier cell moments" if moments else ""))
     return notes
-
-
-def _ranges(numbers: Sequence[int]) -> str:
-    """1, 2, 3, 7 -> "1-3, 7"."""
-    runs: list[list[int]] = []
-    for number in sorted(numbers):
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    return ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)

@@ -6,7 +6,11 @@
     BARRIER K-01 Fx                    -> barrier_k01_fx             on barrier
 
 The place is the comment without what the codes say better: the quantity and axis, which follow as
-a letter each (a, v, d, f, m, w for angular velocity; x, y, z).
+a letter each (a, v, d, f, m, w for angular velocity; x, y, z). Where the comment says nothing (NO COMMENTS), the place
+is that of the location code:
+
+    01, HDCG, NO COMMENTS, XL          -> driver_head_ax             on driver_head
+    FLLR, NO COMMENTS, XG              -> floor_left_rear_ax         on car
 """
 
 import re
@@ -14,6 +18,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from .ev5 import Curve
+from .ev5_codes import location_of, occupant_of
 from .units import quantity_of
 
 LETTER = {
@@ -24,11 +29,8 @@ LETTER = {
     "moment": "m",
     "angular_velocity": "w",
 }
-OCCUPANTS = {"01": "driver", "02": "passenger"}
-FLOOR = ("FL", "VECG", "VEHC")
-"""Beginnings of the locations that move with the passenger cell: floor, centre of gravity."""
-ENGINE = "ENGN"
-
+NOTHING = re.compile(r"(NO|NONE|N/?A|UNKNOWN)?\W*(COMMENTS?|COMMENTARY)?\W*")
+"""A comment that says nothing: NO COMMENTS, NONE, N/A."""
 SAID_BY_CODES = re.compile(
     r"\b([FMA]?[XYZ]R?|RED|REDUNDANT|PRIMARY|ACCELERATION|ANGULAR|VELOCITY|DISPLACEMENT|DEFLECTION"
     r"|FORCE|MOMENT|LOAD|CELL)\b"
@@ -44,15 +46,20 @@ def axis_of(curve: Curve) -> str:
 
 def place(curve: Curve) -> str:
     """Where the sensor is, as a part of a name."""
-    text = curve.comment.split(":")[0].upper()
+    text = curve.comment.split(":")[0].upper().strip()
+    if NOTHING.fullmatch(text):
+        named = location_of(curve.location, "").name
+        owner = "barrier" if curve.vehicle == 0 else occupant_of(curve.occupant)
+        return "_".join(filter(None, [owner, *re.findall(r"[a-z0-9]+", named)]))
     for long, short in SHORTER.items():
         text = text.replace(long, short)
     text = re.sub(r"\b([A-Z])-(\d+)", r"\1\2", text)  # a cell of the barrier: K-01
     text = SAID_BY_CODES.sub(" ", text)
     part, _, whole = text.partition(" OF ")
     words = re.findall(r"[A-Z0-9]+", f"{whole} {part}" if whole else part) or [curve.location]
-    if curve.occupant in OCCUPANTS and OCCUPANTS[curve.occupant].upper() not in words:
-        words.insert(0, OCCUPANTS[curve.occupant])
+    occupant = occupant_of(curve.occupant).upper()
+    if occupant and occupant not in words:
+        words.insert(0, occupant)
     if words[0][0].isdigit():
         words.insert(0, curve.location)
     return "_".join(words).lower()
@@ -63,13 +70,9 @@ def body_of(curve: Curve, vehicles: int) -> str:
     if curve.vehicle == 0:
         return "barrier"
     of_vehicle = f"vehicle{curve.vehicle}_" if vehicles > 1 else ""
-    if curve.occupant in OCCUPANTS:
+    if occupant_of(curve.occupant):
         return of_vehicle + place(curve)
-    if curve.location.startswith(ENGINE):
-        return of_vehicle + "engine"
-    if curve.location.startswith(FLOOR):
-        return of_vehicle + "car"
-    return of_vehicle + place(curve)
+    return of_vehicle + (location_of(curve.location, curve.comment).moves_with or place(curve))
 
 
 def channel_names(curves: Sequence[Curve], vehicles: int) -> list[str]:

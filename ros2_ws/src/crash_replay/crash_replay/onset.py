@@ -1,0 +1,145 @@
+"""When the impact begins, found from the signals themselves: a two-phase regression over all channels at once.
+
+What is found does not depend on the stated time zero.
+
+1. Noise. Each acceleration and force has its mean and standard deviation from the record's first samples, at rest; noise
+   whose neighbours are alike counts for as much less, by how means of RUN scatter there.
+2. Alarm. The first instant at which the mean over RUN of any channel leaves its rest by more than ALARM standard deviations
+   of such means, and HOLDS for as long again.
+3. Change point. Around the alarm, for every instant k: before k a channel is at rest, from k on it follows
+   b0 + b1 (t - t_k) + b2 (t - t_k)^2, with its own coefficients by least squares. Onset is the k with the smallest sum of
+   squared residuals, in units of the channels' noise, over all channels that have woken by the end of the window: the
+   maximum of the likelihood of a change from rest to a smooth rise.
+
+A jump is found to the sample; a rise out of the noise as precisely as its slope allows: the instants that fit almost as
+well (AS_WELL) say how precisely.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from .conditioning import RESTS_AT_ZERO
+from .recording import Recording, RecordingError
+
+AT_REST = 0.010
+"""s of the record's beginning that tell the noise; a record that has less before the impact has no onset to find."""
+LEAST_AT_REST = 40
+RUN, LEAST_RUN = 0.0005, 5  # s, and samples
+ALARM, HOLDS = 8.0, 2
+BACK, AHEAD = 0.004, 0.0015
+"""s before and after the alarm in which the change point is sought and fitted."""
+LEAST_AHEAD = 12
+"""Samples after a change point: three coefficients need more than noise to hold on to."""
+AS_WELL = 9.0
+"""Of the sum of squares: three standard deviations."""
+DIFFERS = 2
+"""Samples by which the onset may be off the stated time zero without a word."""
+
+
+class Onset(NamedTuple):
+    time_ns: int  # since the stated time zero
+    sample: int
+    channels: tuple[str, ...]  # that have woken then
+    precision_ns: int  # that the noise allows
+    differs: bool  # from the stated time zero by more than it can be wrong
+
+
+def find_onset(recording: Recording) -> Onset | None:
+    """The instant at which the impact begins; None where nothing rests at first, or nothing wakes."""
+    period = recording.sample_period
+    quiet = max(LEAST_AT_REST, round(AT_REST / period)) if period else 0
+    if not quiet or len(recording) < 2 * quiet + LEAST_AHEAD:
+        return None
+    run = max(LEAST_RUN, round(RUN / period))
+    names, columns, alarms = [], [], []
+    for channel, values in zip(recording.test.channels, recording.values.T):
+        if channel.quantity not in RESTS_AT_ZERO or not np.isfinite(values[:quiet]).all():
+            continue
+        column = _in_its_noise(values, quiet, run)
+        if column is not None:
+            names.append(channel.name)
+            columns.append(column)
+            alarms.append(_alarm(column, quiet, run))
+    if not any(alarms):
+        return None
+    first = min(alarm for alarm in alarms if alarm)
+    ahead = max(LEAST_AHEAD, round(AHEAD / period))
+    woken = [k for k, alarm in enumerate(alarms) if alarm and alarm <= first + ahead]
+    start = max(quiet // 2, first - round(BACK / period))
+    candidates = np.arange(start, min(first + run, len(recording) - LEAST_RUN))
+    costs = _change_costs(np.array([columns[k] for k in woken]), candidates, min(first + ahead, len(recording)))
+    sample = int(candidates[np.argmin(costs)])
+    almost = candidates[costs <= costs.min() + AS_WELL]
+    time_ns = int(recording.time_ns[sample])
+    precision = int(np.abs(recording.time_ns[almost] - time_ns).max())
+    differs = abs(time_ns) > max(DIFFERS * period * 1e9 + 1.0, precision)
+    return Onset(time_ns, sample, tuple(names[k] for k in woken), precision, differs)
+
+
+def _in_its_noise(values: np.ndarray, quiet: int, run: int) -> np.ndarray | None:
+    """(n,) in units of the noise that a sum of squares may count; None for a channel without any."""
+    rest = values[:quiet]
+    sigma = float(rest.std())
+    if not sigma > 0.0:
+        return None
+    scatter = float(np.convolve(rest, np.full(run, 1.0 / run), mode="valid").std())
+    alike = max(1.0, np.sqrt(run) * scatter / sigma)  # white noise: 1
+    return np.nan_to_num((values - rest.mean()) / (sigma * alike))
+
+
+def _alarm(column: np.ndarray, quiet: int, run: int) -> int:
+    """Index of the first sample of the first run that leaves its rest and stays away; 0 for none."""
+    mean = np.convolve(column, np.full(run, 1.0 / run), mode="valid") * np.sqrt(run)
+    away = np.abs(mean) > ALARM
+    for k in np.flatnonzero(away[quiet:]) + quiet:
+        if away[k : k + HOLDS * run].all():
+            return int(k)
+    return 0
+
+
+def _change_costs(columns: np.ndarray, candidates: np.ndarray, end: int) -> np.ndarray:
+    """Sum of squares that a change at each candidate leaves in columns (channels, n), in units of their noise."""
+    start = int(candidates[0])
+    before = np.concatenate([[0.0], np.cumsum((columns[:, start:end] ** 2).sum(axis=0))])
+    costs = np.full(len(candidates), np.inf)
+    for j, k in enumerate(candidates):
+        if end - k >= LEAST_RUN:
+            t = np.arange(end - k, dtype=float) / (end - start)
+            basis, _ = np.linalg.qr(np.stack([np.ones_like(t), t, t * t], axis=1))
+            after = columns[:, k:end]
+            costs[j] = before[k - start] + np.sum(after * after) - np.sum((after @ basis) ** 2)
+    return costs
+
+
+def at_onset(recording: Recording) -> Recording:
+    """The recording with its time zero at the onset; the notes say by how much it has moved.
+
+    Raises RecordingError where there is no onset to be found.
+    """
+    onset = find_onset(recording)
+    if onset is None:
+        raise RecordingError(
+            f"test {recording.test.id}: no onset found: no acceleration or force is at rest in the first "
+            f"{AT_REST * 1e3:g} ms and wakes later; leave the time zero as it is stated"
+        )
+    note = f"time zero moved to the onset, {onset.time_ns * 1e-6:+.4g} ms from the stated one ({_seen(onset)})"
+    test = replace(recording.test, notes=(*recording.test.notes, note))
+    return Recording(test, recording.time_ns - onset.time_ns, recording.values)
+
+
+def onset_note(recording: Recording) -> str:
+    """A line where the signals begin elsewhere than at the stated time zero, and what to do; "" else."""
+    onset = find_onset(recording)
+    if onset is None or not onset.differs:
+        return ""
+    return (
+        f"onset: the signals begin {onset.time_ns * 1e-6:+.4g} ms from the stated time zero ({_seen(onset)}); "
+        "--time-zero auto takes the onset"
+    )
+
+
+def _seen(onset: Onset) -> str:
+    more = f" and {len(onset.channels) - 2} more" if len(onset.channels) > 2 else ""
+    return ", ".join(onset.channels[:2]) + more

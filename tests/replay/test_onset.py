@@ -1,0 +1,83 @@
+"""The onset of an impact: where it truly is, whatever time zero is stated, and what import makes of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers_paths import BAGS, DATA
+from numpy.testing import assert_array_equal
+
+from crash_replay.bag import read_bag, write_bag
+from crash_replay.import_command import main
+from crash_replay.onset import at_onset, find_onset, onset_note
+from crash_replay.readers import read_source
+from crash_replay.recording import Channel, Recording, RecordingError, Test
+
+SIMULATED = (
+    "frontal_engine_cab", "frontal_single", "hidden_effect", "impactor_single", "side_dummy_padded",
+    "side_dummy_unpadded", "side_mdb_door_car",
+)  # fmt: skip
+MEASURED = (
+    "cyberdiver/linear_undamped__15npmm_4mps_trial1.csv", "cyberdiver/linear_undamped__5npmm_4mps_trial1.csv",
+    "nhtsa-10146",
+)  # fmt: skip
+SHIFTS_MS = (-5.0, -1.0, 1.0, 2.0, 3.0, 5.0)
+
+
+def shifted(recording, ms):
+    return Recording(recording.test, recording.time_ns - round(ms * 1e6), recording.values)
+
+
+def samples_off(recording, time_ns):
+    return abs(time_ns) / (recording.sample_period * 1e9)
+
+
+@pytest.mark.parametrize("name", SIMULATED)
+def test_a_shifted_time_zero_is_found_within_two_samples(name):
+    """Of the truth, which a simulated test knows; and what is made of it is the test that was not shifted."""
+    recording = read_bag(BAGS / f"{name}.mcap")
+    assert samples_off(recording, find_onset(recording).time_ns) <= 2.01
+    assert onset_note(recording) == ""
+    for ms in SHIFTS_MS:
+        moved = shifted(recording, ms)
+        found = find_onset(moved)
+        assert samples_off(recording, found.time_ns + round(ms * 1e6)) <= 2.01 and found.differs
+        assert "--time-zero auto" in onset_note(moved)
+        again = at_onset(moved)
+        assert np.abs(again.time_ns - recording.time_ns).max() <= 2.01e9 * recording.sample_period
+        assert_array_equal(again.values, recording.values)
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_of_measured_tests_the_same_instant_is_found_whatever_is_stated(name):
+    """Nobody knows their truth: what is stated is a contact switch's or a person's word, within 1 ms of what is found."""
+    if not (DATA / name).exists():
+        pytest.skip(f"{DATA / name} is not there")
+    recording = read_source(DATA / name)
+    found = find_onset(recording)
+    assert abs(found.time_ns) <= 1_050_000
+    for ms in SHIFTS_MS:
+        assert abs(find_onset(shifted(recording, ms)).time_ns + round(ms * 1e6) - found.time_ns) <= 1
+
+
+def test_import_finds_it_and_says_so(tmp_path, capsys):
+    late = shifted(read_bag(BAGS / "frontal_single.mcap"), 3.0)
+    write_bag(late, tmp_path / "late.mcap")
+    assert main([str(tmp_path / "late.mcap"), "--to", str(tmp_path / "a.mcap")]) == 0
+    assert "the signals begin -3 ms from the stated time zero (barrier_fx" in capsys.readouterr().out
+    assert main([str(tmp_path / "late.mcap"), "--to", str(tmp_path / "b.mcap"), "--time-zero", "auto"]) == 0
+    assert "time zero moved to the onset, -3 ms from the stated one" in capsys.readouterr().out
+    assert_array_equal(read_bag(tmp_path / "b.mcap").time_ns, read_bag(BAGS / "frontal_single.mcap").time_ns)
+
+
+def test_where_there_is_none_it_is_one_line(tmp_path):
+    time_ns = np.arange(1000) * 100_000 - 50_000_000
+    noise = np.random.default_rng(2).normal(size=(1000, 1))
+    rest = Recording(Test("T", (Channel("a", "acceleration"),)), time_ns, noise)
+    assert find_onset(rest) is None and onset_note(rest) == ""
+    with pytest.raises(RecordingError, match="no onset found"):
+        at_onset(rest)
+    only_length = replace(rest, test=Test("T", (Channel("a", "displacement"),)))
+    assert find_onset(only_length) is None
+    assert find_onset(Recording(rest.test, time_ns[:30], noise[:30])) is None
+    assert find_onset(replace(rest, values=np.zeros((1000, 1)))) is None
