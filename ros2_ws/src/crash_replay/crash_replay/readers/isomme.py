@@ -16,6 +16,7 @@ import numpy as np
 
 from .. import limits
 from ..recording import Channel, Recording, RecordingError, Test
+from .dates import stamp_of
 from .isomme_codes import channel_of, is_time
 from .units import si_factor
 
@@ -97,6 +98,7 @@ def read(path: Path) -> Recording:
             source=", ".join(filter(None, source)),
             initial_velocity=velocity,
             notes=tuple(notes),
+            impact_ns=stamp_of(header.get("date of the test") or ""),
         )
         return Recording(test, time_ns, values)
     except RecordingError as error:

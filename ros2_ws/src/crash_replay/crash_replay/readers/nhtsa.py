@@ -15,6 +15,7 @@ import numpy as np
 
 from .. import limits
 from ..recording import Channel, Recording, RecordingError, Test
+from .dates import stamp_of
 from .ev5 import Curve, Header, read_header
 from .nhtsa_names import axis_of, body_of, channel_names
 from .units import KMH, quantity_of, si_factor
@@ -89,6 +90,7 @@ def read(path: Path, cells: bool = False) -> Recording:
             source=f"NHTSA Vehicle Crash Test Database, test {header.number}: {header.laboratory}, {header.date}",
             initial_velocity=_initial_velocity(tracks),
             notes=tuple(notes),
+            impact_ns=stamp_of(header.date),
         )
         return Recording(test, time_ns, np.stack(list(columns.values()), axis=1))
     except RecordingError as error:
