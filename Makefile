@@ -1,4 +1,4 @@
-.PHONY: help demo test bags thesis benchmark benchmark-effects chaos endurance fuzz clean
+.PHONY: help demo test bags thesis benchmark benchmark-effects benchmark-outside chaos endurance fuzz clean
 
 help: # what there is to make
 	@sed -n 's/^\([a-z-]*\):.*# /make \1	/p' Makefile
@@ -30,6 +30,9 @@ benchmark: # every promised speed beside its reference, 8 minutes: docs/benchmar
 
 benchmark-effects: # which hidden effects are found, on 1500 simulated tests: docs/missing-effects.md; ARGS="--cases 20" writes out/missing-effects.md
 	@tools/env python -m crash_estimator.benchmarks.effects $(ARGS)
+
+benchmark-outside: # what is said of recordings made elsewhere, in DATA=FOLDER, which do not come with the project: docs/outside.md
+	@tools/env python -m crash_estimator.benchmarks.outside --data "$(DATA)"
 
 chaos: # processes killed, stopped and started again on purpose, 200 runs: docs/chaos.md; ARGS="--runs 20", --seed, --only, --case
 	@tools/env python -m crash_estimator.chaos $(ARGS)

@@ -1,7 +1,9 @@
 """`diagnose BAG [BAG ...] --model M`: which physical effect is missing from a model, by one or more recordings."""
 
 import argparse
+import math
 import sys
+from dataclasses import replace
 from io import StringIO
 from itertools import permutations
 
@@ -14,9 +16,9 @@ from crash_replay.foreign_text import visible
 from crash_replay.output import write_text
 from crash_replay.said import Parser, say
 
-from ..core.diagnosis import Diagnosis, diagnose
+from ..core.diagnosis import DEFAULT, UNEXPLAINED, Diagnosis, Tolerance, diagnose, tolerance_of
 from ..core.effects.effect import Effect
-from ..core.structure import EffectSpec
+from ..core.structure import EffectSpec, ModelError
 from ..diagnosis_doubt import doubt
 from ..diagnosis_tables import diagnosis_tables
 from ..model_file import load_model, model_path, ready_models
@@ -32,23 +34,57 @@ def _parser() -> Parser:
     parser.add_argument("bags", nargs="+", metavar="BAG", help="recordings of one structure, best at different speeds")
     parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
     parser.add_argument("--apply", metavar="NEW_MODEL.yaml", help="write the model with the effects that were found")
+    parser.add_argument(
+        "--apply-unexplained", action="store_true", help="with --apply: also what explains part of it only"
+    )
+    parser.add_argument(
+        "--good-enough", metavar="RATING|PERCENT%", type=_tolerance, default=DEFAULT,
+        help="what may be left in every channel: an ISO/TS 18571 rating, as in 0.8, or an RMS as a share of the peak, "
+        "as in 5%%; a model that is as good is adequate as it is. Default: 1%% completes an explanation, no more",
+    )  # fmt: skip
     parser.add_argument("--json", metavar="FILE", help="write everything that was found")
+    parser.add_argument(
+        "--time-limit", metavar="S", type=_seconds, default=math.inf,
+        help="after so many seconds nothing more is tried, and the best answer so far given",
+    )  # fmt: skip
     add_effects_option(parser)
     return parser
+
+
+def _tolerance(text: str) -> Tolerance:
+    try:
+        return tolerance_of(text)
+    except ModelError as error:  # argparse says what its own errors say
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not seconds > 0.0:
+        raise argparse.ArgumentTypeError(f"a time limit is a number of seconds above 0, got {text!r}")
+    return seconds
 
 
 def run(arguments: argparse.Namespace) -> None:
     check_written(arguments, *arguments.bags, json=arguments.json, apply=arguments.apply)
     effects = effects_of(arguments)
     structure = load_model(arguments.model, effects)
-    found = diagnose(structure, [read_bag(bag) for bag in arguments.bags], effects)
+    found = diagnose(
+        structure, [read_bag(bag) for bag in arguments.bags], effects, arguments.good_enough, arguments.time_limit
+    )
     if arguments.json:  # files before words: `| head` ends this at a line that nobody reads
         write_json(arguments.json, found.as_json())
-    added = apply(found, structure.effects, effects, arguments.model, arguments.apply) if arguments.apply else ""
+    believed = found.verdict != UNEXPLAINED or arguments.apply_unexplained
+    applied = found if believed else replace(found, structure=structure, steps=())
+    added = apply(applied, structure.effects, effects, arguments.model, arguments.apply) if arguments.apply else ""
     say("\n".join(line for line in (found.text, doubt(found)) if line))
     say(f"\n{diagnosis_tables(found)}")
     if arguments.apply:
-        say(f"\n{visible(arguments.apply)}: {visible(arguments.model)} with {added or 'nothing added'}")
+        why = "" if believed else "; what explains part of it only is added by --apply-unexplained"
+        say(f"\n{visible(arguments.apply)}: {visible(arguments.model)} with {added or 'nothing added'}{why}")
 
 
 def apply(found: Diagnosis, had: tuple[EffectSpec, ...], effects: dict[str, Effect], model: str, target: str) -> str:

@@ -52,7 +52,7 @@ class Story:
             return self._after(block)
         self.lacks = _lacks(block)
         errors = f"error {G.factor * block.rms_before:.3g} {G.unit}, noise floor {G.factor * block.noise_floor:.3g}"
-        return [f"all samples: {block.verdict.replace('_', ' ')}; {errors}"]
+        return [f"all samples: {block.said}; {errors}"]
 
     def _sign(self, block: RankingBlock) -> list[str]:
         best = block.ranking[0] if block.ranking and block.verdict == "effect_missing" else None
@@ -66,7 +66,7 @@ class Story:
 
     def _after(self, block: RankingBlock) -> list[str]:
         first = self.finals[min(self.finals)]
-        return [_fall(first, block), f"verdict with it: {block.verdict.replace('_', ' ')}{_rest(block)}"]
+        return [_fall(first, block), f"verdict with it: {block.said}{_rest(block)}"]
 
 
 def _where(window: Window) -> str:

@@ -40,6 +40,7 @@ def ranking_message(at: Moment, answer: OnlineAnswer) -> Ranking:
         final=answer.final,
         model=at.structure.name,
         verdict=answer.verdict,
+        complete=answer.complete,
         ranking=[_ranked(ranked) for ranked in answer.ranking],
         rms_before=answer.rms.before,
         rms_after=answer.rms.after,

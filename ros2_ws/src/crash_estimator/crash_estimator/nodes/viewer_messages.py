@@ -80,6 +80,7 @@ def ranking_block(message: Ranking) -> RankingBlock:
         message.force,
         message.force_explained_before,
         message.force_explained_after,
+        message.complete,
     )
 
 

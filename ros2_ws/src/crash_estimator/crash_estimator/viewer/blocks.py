@@ -21,6 +21,9 @@ class TestBlock(NamedTuple):
     __test__ = False  # not a pytest class
 
 
+UNKNOWN_TEST = TestBlock("test", "", "", 0, 0.0)
+
+
 class ParameterBlock(NamedTuple):
     """n samples of p parameters."""
 

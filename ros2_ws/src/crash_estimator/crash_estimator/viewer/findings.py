@@ -53,6 +53,13 @@ class RankingBlock(NamedTuple):
     force: str = ""  # channel of the measured force, where the share that all inertias explain is known
     force_explained_before: float = np.nan  # 0 to 1
     force_explained_after: float = np.nan
+    complete: bool = True  # what is left with what was found is noise, or within the tolerance
+
+    @property
+    def said(self) -> str:
+        """The verdict in words."""
+        grade = "" if self.complete or self.verdict != "effect_missing" else ", and not all that is missing"
+        return f"{self.verdict.replace('_', ' ')}{grade}"
 
 
 class Window(NamedTuple):

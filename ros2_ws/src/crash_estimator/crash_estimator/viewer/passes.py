@@ -8,7 +8,7 @@ from pathlib import Path
 
 import rerun as rr
 
-from .blocks import Block, EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock
+from .blocks import UNKNOWN_TEST, Block, EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock
 from .cast import Cast, Member, member
 from .findings import Finding, RankingBlock
 from .judged import Jury
@@ -30,8 +30,6 @@ FILE_END = b"RRF2FOOT"
 
 KINDS = {ParameterBlock, ResidualBlock, ForceBlock}
 """What an estimator says of every sample."""
-
-UNKNOWN_TEST = TestBlock("test", "", "", 0, 0.0)
 
 
 class Pass:

@@ -10,11 +10,14 @@ from .online.online_answer import FitCurves, OnlineAnswer, final_answer
 from .online.online_diagnosis import OnlineDiagnosis
 from .report.diagnosis import Diagnosis, diagnose
 from .report.ranking import Ranked, StepReport
+from .report.tolerance import DEFAULT, Tolerance, tolerance_of
+from .report.verdict import ADEQUATE, EFFECT_MISSING, UNEXPLAINED
 from .residuals.misfit_windows import MisfitWindow
 from .selection.fitted_model import Model
 from .selection.thresholds import THRESHOLDS
 
 __all__ = [
-    "THRESHOLDS", "Diagnosis", "FitCurves", "MisfitWindow", "Model", "OnlineAnswer", "OnlineDiagnosis", "OnlineState",
-    "Ranked", "StepReport", "diagnose", "final_answer",
+    "ADEQUATE", "DEFAULT", "EFFECT_MISSING", "THRESHOLDS", "UNEXPLAINED", "Diagnosis", "FitCurves", "MisfitWindow",
+    "Model", "OnlineAnswer", "OnlineDiagnosis", "OnlineState", "Ranked", "StepReport", "Tolerance", "diagnose",
+    "final_answer", "tolerance_of",
 ]  # fmt: skip

@@ -34,6 +34,7 @@ class FitCurves(NamedTuple):
 
 class OnlineAnswer(NamedTuple):
     verdict: str  # effect_missing, adequate or unexplained
+    complete: bool  # what is left with what was found is noise, or within the tolerance
     text: str  # one readable line
     ranking: tuple[Ranked, ...]  # best first
     found: tuple[EffectSpec, ...]  # what is missing, one added after the other; with its constants where that is final
@@ -56,6 +57,7 @@ def final_answer(found: Diagnosis) -> OnlineAnswer:
     force, share = next(iter(found.steps[0].force_explained.items() if found.steps else ()), ("", {}))
     return OnlineAnswer(
         verdict=found.verdict,
+        complete=found.complete,
         text=found.text,
         ranking=found.ranking,
         found=effects,

@@ -84,6 +84,7 @@ class OnlineDiagnosis:
         ]
         answer = OnlineAnswer(
             verdict="effect_missing" if best else "adequate" if given.residuals.white else "unexplained",
+            complete=residuals.white,
             text="",
             ranking=ranking_of(done),
             found=found,

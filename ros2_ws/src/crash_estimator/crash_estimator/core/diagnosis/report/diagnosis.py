@@ -1,7 +1,8 @@
 """Which physical effect is missing: the answer, from a structure and one or more recordings of it."""
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from crash_replay.recording import Recording
 
@@ -12,11 +13,15 @@ from ..observation.record import observe
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import free_run, noise_floor
 from ..residuals.score_test import Drift, drift_of
-from ..selection.assumptions import SelectionPath, select
+from ..selection.assumptions import SelectionPath, first_believed, select
 from ..selection.fitted_model import Model
+from ..selection.time_limit import out_of_time, time_limit
+from .left import Left, band_of, left_by
 from .model_effects import structure_with
 from .ranking import Ranked, StepReport, ranking_of, step_of
-from .verdict_text import MOST_AT_ONCE, verdict_text
+from .tolerance import DEFAULT, Tolerance
+from .verdict import Evidence, verdict_on
+from .verdict_text import verdict_text
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,11 @@ class Diagnosis:
     """What was found; `as_json` is the contract of `diagnose --json`."""
 
     verdict: str  # effect_missing, adequate or unexplained
+    complete: bool  # what is left is noise, or within the tolerance
+    left: Left  # with what was added
+    left_before: Left  # as given, in the same band
+    noise: bool  # it is noise
+    tolerance: Tolerance
     text: str  # one readable line
     residual_rms: Rms  # of the fit
     free_run_rms: Rms  # of a simulation from the initial motion alone
@@ -44,10 +54,15 @@ class Diagnosis:
     misfit_after: tuple[MisfitWindow, ...]
     structure: Structure  # with the effects that were added
     models: tuple[Model, ...]  # as given, then after each step
+    stopped: bool = False  # the time was up before everything was tried
 
     def as_json(self) -> dict:
         return {
             "verdict": self.verdict,
+            "complete": self.complete,
+            "left": self.left.as_json() | {"noise": self.noise},
+            "tolerance": self.tolerance.as_json(),
+            "stopped": self.stopped,
             "text": self.text,
             "residual_rms": vars(self.residual_rms),
             "free_run_rms": {k: v for k, v in vars(self.free_run_rms).items() if v is not None},
@@ -59,21 +74,36 @@ class Diagnosis:
 
 
 def diagnose(
-    structure: Structure, recordings: Sequence[Recording], effects: Mapping[str, Effect] = EFFECTS
+    structure: Structure,
+    recordings: Sequence[Recording],
+    effects: Mapping[str, Effect] = EFFECTS,
+    tolerance: Tolerance = DEFAULT,
+    seconds: float = math.inf,
 ) -> Diagnosis:
     """Compare a structure (with the effects that it has) with recordings of it, and name what is missing.
+
+    tolerance: what may be left of a model that is good enough; seconds: after which nothing more is tried.
 
     Raises ModelError or RecordingError, one line, where the data or the model is at fault.
     """
     if not recordings:
         raise ModelError("a diagnosis needs at least one recording")
-    path = select(structure, [observe(structure, recording) for recording in recordings], effects)
-    return _answer(structure, path, drift_of(path.as_recorded))
+    with time_limit(seconds):
+        records = [observe(structure, recording) for recording in recordings]
+        path = first_believed(select(structure, records, effects), records)
+        stopped = out_of_time()
+    found = _answer(structure, path, drift_of(path.as_recorded), tolerance)
+    if not stopped:
+        return found
+    return replace(found, stopped=True, text=f"{found.text}; stopped after {seconds:g} s: not everything was tried")
 
 
-def _answer(structure: Structure, path: SelectionPath, drift: Drift) -> Diagnosis:
+def _answer(structure: Structure, path: SelectionPath, drift: Drift, tolerance: Tolerance) -> Diagnosis:
+    first, band = path.steps[0].before, band_of(path.final)
+    before = left_by(first, band)
+    if tolerance.stated and tolerance.admits(before):  # whoever says so wants nothing added
+        path = path._replace(steps=path.steps[:1], final=first)
     steps, final, present = path.steps, path.final, path.present
-    first = steps[0].before
     models = tuple(step.before for step in steps)
     if models[-1] is not final:
         models = (*models, final)
@@ -81,13 +111,19 @@ def _answer(structure: Structure, path: SelectionPath, drift: Drift) -> Diagnosi
     runs = [free_run(model.fit).rms for model in models]
     pairs = zip(steps, models, models[1:], zip(runs, runs[1:], strict=False), strict=False)  # the last has no successor
     reports = tuple(step_of(*each, final) for each in pairs)[: len(added)]
-    explained = final.white and drift.constant and len(added) <= MOST_AT_ONCE
-    verdict = ("effect_missing" if added else "adequate") if explained else "unexplained"
+    ranking, after = ranking_of(steps[0]), left_by(final, band)
+    weighed, certain = final.fit.problem.noise_is_inflated, all(abs(one.coefficient) > one.std for one in reports)
+    evidence = Evidence(len(added), final.white, drift, before, after, ranking, weighed, certain)
+    verdict = verdict_on(evidence, tolerance)
     floor = noise_floor(first.fit.layout, first.records)
-    ranking = ranking_of(steps[0])
     return Diagnosis(
-        verdict=verdict,
-        text=verdict_text(verdict, reports, ranking, first, final, floor, drift, path.structure is structure),
+        verdict=verdict.word,
+        complete=verdict.complete,
+        left=after,
+        left_before=before,
+        noise=evidence.noise,
+        tolerance=tolerance,
+        text=verdict_text(verdict, evidence, tolerance, reports, first, final, floor, path.structure is structure),
         residual_rms=Rms(first.residuals.rms, final.residuals.rms, floor),
         free_run_rms=Rms(runs[0], runs[-1]),
         ranking=ranking,

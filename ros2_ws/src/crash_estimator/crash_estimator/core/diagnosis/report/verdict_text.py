@@ -4,55 +4,66 @@ from collections.abc import Sequence
 
 from scipy.constants import g as G
 
-from ..residuals.score_test import Drift
 from ..selection.fitted_model import Model
 from ..selection.thresholds import THRESHOLDS
-from .ranking import Ranked, StepReport
-
-MOST_AT_ONCE = 2
-"""Effects that are believed together: what takes three of them is more likely one that is not in the vocabulary."""
+from .left import Left
+from .ranking import StepReport
+from .tolerance import Tolerance
+from .verdict import ADEQUATE, EFFECT_MISSING, Evidence, Verdict
 
 GOES_ALONG = 0.5
 """Share of what is left that is worth naming what it goes along with."""
 
 
 def verdict_text(
-    verdict: str, steps: Sequence[StepReport], ranking: Sequence[Ranked], first: Model, final: Model, floor: float,
-    drift: Drift, as_given: bool,
+    verdict: Verdict, evidence: Evidence, tolerance: Tolerance, steps: Sequence[StepReport], first: Model,
+    final: Model, floor: float, as_given: bool,
 ) -> str:  # fmt: skip
     """first, final: the model as given and with what was added; floor: RMS of the sensors' noise, m/s^2; as_given:
     dampers of compression-only elements may pull as the model file says."""
-    said = _said(verdict, steps, ranking, first, final, floor, drift)
+    if verdict.word == ADEQUATE:
+        said = f"adequate: {_adequate(evidence, tolerance, final, floor)}"
+    elif verdict.word == EFFECT_MISSING:
+        said = f"effect missing: {_missing(evidence, tolerance, steps, first, final, floor)}"
+    else:
+        said = f"unexplained: {_unexplained(evidence, steps, first, final, floor)}"
     return said if as_given else f"{said}; with contacts that never pull, not even by their dampers"
 
 
-def _said(verdict, steps, ranking, first: Model, final: Model, floor: float, drift: Drift) -> str:
-    names = ", ".join(f"{step.effect} on {step.target}" for step in steps)
-    size = f"residual RMS {first.residuals.rms / G:.3g} -> {final.residuals.rms / G:.3g} g, noise floor {floor / G:.3g}"
-    if verdict == "adequate":
-        left = f"residual RMS {final.residuals.rms / G:.3g} g, noise floor {floor / G:.3g}"
-        until = (
-            ""
-            if _unloads(final)
-            else "; the recording ends before anything unloads: what would come then is not judged"
-        )
-        return f"adequate: nothing significant is missing ({left}){until}"
-    if verdict == "effect_missing":
-        advice = ""
-        rivals = ranking[0].confounded_with if ranking else ()
-        if rivals:
-            advice = f"; this cannot be told from {', '.join(rivals)}"
-            advice += " on one recording: record another speed" if len(first.records) == 1 else " on these recordings"
+def _adequate(evidence: Evidence, tolerance: Tolerance, final: Model, floor: float) -> str:
+    left = f"residual RMS {final.residuals.rms / G:.3g} g, noise floor {floor / G:.3g}"
+    if not evidence.noise:
+        return f"{_what_is_left(evidence.after)}, is within {tolerance.text} ({left})"
+    until = (
+        "" if _unloads(final) else "; the recording ends before anything unloads: what would come then is not judged"
+    )
+    return f"nothing significant is missing ({left}){until}"
+
+
+def _missing(evidence: Evidence, tolerance: Tolerance, steps, first: Model, final: Model, floor: float) -> str:
+    rivals, advice = evidence.ranking[0].confounded_with if evidence.ranking else (), ""
+    if rivals:
+        advice = f"; this cannot be told from {', '.join(rivals)}"
+        advice += " on one recording: record another speed" if len(first.records) == 1 else " on these recordings"
+    if evidence.noise:
         small = first.residuals.rms < THRESHOLDS.near_floor**0.5 * floor
         why = f"; small, yet noise would not leave it ({steps[0].evidence:.0f} nats of evidence)" if small else ""
-        return f"effect missing: {names}; {size}, now white{why}{advice}"
+        return f"{_names(steps)}; {_size(first, final, floor)}, now white{why}{advice}"
+    share = evidence.after.share_explained(evidence.before)
+    within = tolerance.admits(evidence.after)
+    grade = f"is within {tolerance.text}" if within else f"is more than {tolerance.text}, and is no noise: incomplete"
+    explains = f"{'it explains' if len(steps) == 1 else 'they explain'} {share:.0%} of the misfit"
+    return f"{_names(steps)}; {explains}, {_fall(evidence)}; {_what_is_left(evidence.after)}, {grade}{advice}"
+
+
+def _unexplained(evidence: Evidence, steps, first: Model, final: Model, floor: float) -> str:
+    names, size, drift = _names(steps), _size(first, final, floor), evidence.drift
+    if evidence.white and drift.constant:  # several effects together
+        return f"{names} together leave only noise; {size}; one effect of another kind is likelier than so many"
     along = f"{drift.what} that varies with time, as no candidate does"
-    if final.residuals.white and len(steps) > MOST_AT_ONCE:
-        why = "one effect of another kind is likelier than so many"
-        return f"unexplained: {names} together leave only noise; {size}; {why}"
-    if final.residuals.white:
+    if evidence.white:
         given = f"with {names} it looks white" if steps else "it looks white"
-        return f"unexplained: {given}; {size}; yet what is left goes along with {along}"
+        return f"{given}; {size}; yet what is left goes along with {along}"
     worst = final.residuals.band_test.worst
     layout = final.fit.layout
     where = (
@@ -62,7 +73,27 @@ def _said(verdict, steps, ranking, first: Model, final: Model, floor: float, dri
     done = f"{names} {'explains' if len(steps) == 1 else 'explain'} part of it; " if steps else ""
     left = f"no candidate explains what is left, most of it in {where}"
     also = f"; it goes along with {along}" if drift.share > GOES_ALONG and not drift.constant else ""
-    return f"unexplained: {done}{size}; {left}{also}"
+    return f"{done}{size}; {left}{also}"
+
+
+def _names(steps: Sequence[StepReport]) -> str:
+    return ", ".join(f"{step.effect} on {step.target}" for step in steps)
+
+
+def _size(first: Model, final: Model, floor: float) -> str:
+    return f"residual RMS {first.residuals.rms / G:.3g} -> {final.residuals.rms / G:.3g} g, noise floor {floor / G:.3g}"
+
+
+def _fall(evidence: Evidence) -> str:
+    before, after = evidence.before, evidence.after
+    return f"RMS {before.rms / G:.3g} -> {after.rms / G:.3g} g" + (f" below {after.band}" if after.cfc else "")
+
+
+def _what_is_left(left: Left) -> str:
+    if not left.channels:
+        return "what is left"
+    worst = left.channels[0]
+    return f"what is left, {100.0 * worst.of_peak:.3g} % of the peak of {worst.channel}"
 
 
 def _unloads(model: Model) -> bool:

@@ -25,6 +25,7 @@ from .forward_selection import forward_selection
 from .pruning import up_to_the_least_error
 from .selection_step import SelectionStep
 from .thresholds import THRESHOLDS
+from .time_limit import out_of_time
 
 CELLS = 36
 """Of a free curve over its crush scale: 1 cm of a crush of 0.4 m, the length of a fold of a longitudinal."""
@@ -50,9 +51,19 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
     """The effects that a structure lacks. Raises ModelError where it names an effect that there is not."""
     path = _with_curves_as_fine_as_needed(structure, records, effects)
     pushing = never_pulling(structure)
-    if pushing is not structure and _may_be_explained_by(pushing, path, records):
+    if pushing is not structure and not out_of_time() and _may_be_explained_by(pushing, path, records):
         path = max(path, _with_curves_as_fine_as_needed(pushing, records, effects), key=SelectionPath.rank)
     return path
+
+
+def first_believed(path: SelectionPath, records: Sequence[ObservedRecord]) -> SelectionPath:
+    """Up to as many additions as are believed together, where all of them leave more than noise: the first ones explain
+    most, and what came after them only goes on from there."""
+    most = THRESHOLDS.most_at_once
+    if path.final.white or len(path.final.additions) - path.present <= most:
+        return path
+    final = path.steps[most].before
+    return path._replace(steps=path.steps[: most + 1], final=final, as_recorded=in_the_sensors_noise(final, records))
 
 
 def never_pulling(structure: Structure) -> Structure:
@@ -105,7 +116,7 @@ def _with_curves_as_fine_as_needed(
     steps, final = forward_selection(magnitudes, effects, present)
     as_recorded = in_the_sensors_noise(final, records)
     finer = measure_magnitudes(structure, records, FINER_CELLS)
-    if _wants_finer_curves(final, analyse(as_recorded), finer, len(present)):
+    if not out_of_time() and _wants_finer_curves(final, analyse(as_recorded), finer, len(present)):
         finer_steps, finer_final = forward_selection(finer, effects, present)
         fewer = len(finer_final.additions) < len(final.additions) or not final.white
         if finer_final.white and fewer:

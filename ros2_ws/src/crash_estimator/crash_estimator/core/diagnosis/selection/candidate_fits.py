@@ -22,6 +22,7 @@ from .candidates import candidates
 from .fitted_model import Model
 from .score_screening import Screened, screen, shortlist
 from .thresholds import THRESHOLDS
+from .time_limit import out_of_time
 
 
 class CandidateFit(NamedTuple):
@@ -74,7 +75,7 @@ def fit_candidates(
             search.slowly,
             lambda: search.anew(LARGE_NOISE),
         ):
-            if search.reached_the_floor():
+            if out_of_time() or search.reached_the_floor():
                 break
             harder()
     return search.ranking()
@@ -158,7 +159,7 @@ class _Search:
     def _fit(
         self, addition: Addition, screened: Screened | None = None, schedule: Schedule = FROM_MEASURED_MOTION
     ) -> None:
-        if (id(addition), schedule) in self.done:
+        if (id(addition), schedule) in self.done or out_of_time():
             return
         self.done.add((id(addition), schedule))
         problem = self._problem(addition)

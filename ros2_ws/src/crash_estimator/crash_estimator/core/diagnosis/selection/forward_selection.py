@@ -12,6 +12,7 @@ from .pair_search import two_at_once
 from .pruning import without_the_superseded
 from .selection_step import SelectionStep, added, selection_step
 from .thresholds import THRESHOLDS
+from .time_limit import out_of_time
 
 
 def forward_selection(
@@ -20,7 +21,7 @@ def forward_selection(
     """All steps, and the last model."""
     given = fit_model(magnitudes, magnitudes.records, present)
     path, final = _one_by_one(magnitudes, effects, given, [], len(present))
-    if final.white:
+    if final.white or out_of_time():
         return path, final
     pair = two_at_once(magnitudes, effects, given, path[0].as_recorded)
     if pair is None:
@@ -32,7 +33,7 @@ def _one_by_one(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: list[SelectionStep], present: int
 ) -> tuple[list[SelectionStep], Model]:
     """The best candidate is added as long as there is one; path: the steps that have led to the model."""
-    while True:
+    while not (path and out_of_time()):
         done = selection_step(magnitudes, effects, model, path)
         path.append(done)
         fair = _without(model, done.best) if done.best and done.before is model else model
@@ -50,6 +51,7 @@ def _one_by_one(
             if explains_too_little(done.before.residuals, after):
                 return path, done.before
         model = larger
+    return path, model
 
 
 def _without(model: Model, found: CandidateFit) -> Model:

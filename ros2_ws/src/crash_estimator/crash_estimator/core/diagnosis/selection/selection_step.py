@@ -19,6 +19,7 @@ from .acceptance import better
 from .candidate_fits import CandidateFit, fit_candidates
 from .fitted_model import Model, fit_model
 from .thresholds import THRESHOLDS
+from .time_limit import out_of_time
 
 
 class SelectionStep(NamedTuple):
@@ -47,6 +48,8 @@ def selection_step(
     if model.white or (done.best and analyse(done.best.fit).white):
         return done
     for _ in range(THRESHOLDS.inflations):
+        if out_of_time():
+            break
         residuals = analyse(done.best.fit) if done.best else done.before.residuals
         noisier = with_inflated_noise(model.records, bounded(residuals.residual, model.records))
         before = fit_model(magnitudes, noisier, model.additions)

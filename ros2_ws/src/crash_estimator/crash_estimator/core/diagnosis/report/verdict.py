@@ -1,0 +1,76 @@
+"""The verdict in two grades: whether something is named, and whether what is left then is complete."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ..residuals.score_test import Drift
+from ..selection.thresholds import THRESHOLDS
+from .left import Left
+from .ranking import Ranked
+from .tolerance import Tolerance
+
+EFFECT_MISSING, ADEQUATE, UNEXPLAINED = "effect_missing", "adequate", "unexplained"
+
+
+class Evidence(NamedTuple):
+    """What a verdict is given on."""
+
+    added: int  # effects
+    white: bool  # the last model leaves noise only, band by band
+    drift: Drift  # what that goes along with, of all that may vary with time
+    before: Left  # of the model as given
+    after: Left  # with what was added
+    ranking: Sequence[Ranked]  # of the first step
+    weighed: bool  # the evidence was taken in a noise as large as what is left
+    certain: bool  # every coefficient that was added is beyond its standard deviation
+
+    @property
+    def noise(self) -> bool:
+        """What is left is noise in every respect."""
+        return self.white and self.drift.constant
+
+
+class Verdict(NamedTuple):
+    word: str
+    complete: bool  # what is left is noise, or within the tolerance
+
+
+def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
+    """`adequate`: nothing significant is missing, or what is left is within the tolerance; `effect_missing`: what is
+    named beats its rivals and takes a large share of the misfit away; else `unexplained`."""
+    within = tolerance.admits(evidence.after)
+    if tolerance.stated and tolerance.admits(evidence.before):
+        return Verdict(ADEQUATE, True)
+    if evidence.noise:
+        word = EFFECT_MISSING if evidence.added else ADEQUATE
+        return Verdict(word if evidence.added <= THRESHOLDS.most_at_once else UNEXPLAINED, True)
+    if evidence.white or not _stands_still(evidence.drift):  # it looks like noise, and varies with time: a mimic
+        return Verdict(UNEXPLAINED, False)
+    if not evidence.added:
+        return Verdict(ADEQUATE if within else UNEXPLAINED, within)
+    named = _explains(evidence) and (within or _beats_its_rivals(evidence.ranking))
+    return Verdict(EFFECT_MISSING, within) if named else Verdict(UNEXPLAINED, False)
+
+
+def _stands_still(drift: Drift) -> bool:
+    """Most of what is left does not go along with a mass, a force or a gain that varies with time."""
+    return drift.constant or drift.share < THRESHOLDS.varying
+
+
+def _explains(evidence: Evidence) -> bool:
+    """In the sensors' noise the evidence of what leaves more than that knows no doubt: it has to be weighed first."""
+    few = evidence.added <= THRESHOLDS.most_at_once
+    return (
+        few
+        and evidence.weighed
+        and evidence.certain
+        and evidence.after.share_explained(evidence.before) > THRESHOLDS.named_share
+    )
+
+
+def _beats_its_rivals(ranking: Sequence[Ranked]) -> bool:
+    """The first candidate does, by evidence, all that were fitted but the same effect elsewhere and other laws of the
+    same target: what is missing is sure then, or where; these rivals are named."""
+    first, *others = ranking
+    unlike = [r.evidence for r in others if r.fitted and r.effect != first.effect and r.target != first.target]
+    return first.evidence > max(unlike, default=0.0) + THRESHOLDS.confounded

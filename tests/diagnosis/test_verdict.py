@@ -1,0 +1,158 @@
+"""The verdict in two grades: named or not, complete or not; and what is left, in the band that a model speaks for."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers_paths import ROOT
+
+from crash_estimator.cli import diagnose as command
+from crash_estimator.core.diagnosis import diagnose
+from crash_estimator.core.diagnosis.report.left import ChannelLeft, Left
+from crash_estimator.core.diagnosis.report.ranking import Ranked
+from crash_estimator.core.diagnosis.report.tolerance import DEFAULT, Tolerance, tolerance_of
+from crash_estimator.core.diagnosis.report.verdict import Evidence, verdict_on
+from crash_estimator.core.diagnosis.residuals.score_test import Drift
+from crash_estimator.core.structure import ModelError
+from crash_estimator.model_file import load_model
+from crash_replay.bag import read_bag
+from crash_replay.conditioning import filter_recording
+from crash_replay.recording import Recording
+from crash_replay.synthetic.hidden.cases import draw_case
+
+FRONTAL = ROOT / "bags" / "frontal_single.mcap"
+STANDS_STILL = Drift(False, 1e-9, "the mass of car", 0.1)
+
+
+def left(of_peak: float, rms: float, rating: float | None = 0.9) -> Left:
+    return Left(rms, 0.1, 0.0, 60, (ChannelLeft("car_ax", "test", rms, "m/s^2", of_peak, rating),))
+
+
+def ranked(effect: str, target: str, evidence: float, fitted: bool = True) -> Ranked:
+    return Ranked(effect, target, 1.0, 0.1, "N", evidence, 0.9, True, (), fitted=fitted)
+
+
+LEADER = ranked("coulomb_friction", "car_barrier", 50.0)
+EVIDENCE = Evidence(1, False, STANDS_STILL, left(0.2, 10.0, 0.5), left(0.05, 2.0), (LEADER,), True, True)
+
+
+@pytest.mark.parametrize(
+    "changed, tolerance, word, complete",
+    [
+        ({}, DEFAULT, "effect_missing", False),
+        ({"after": left(0.009, 2.0)}, DEFAULT, "effect_missing", True),
+        ({"white": True, "drift": STANDS_STILL._replace(constant=True)}, DEFAULT, "effect_missing", True),
+        ({"after": left(0.19, 9.0)}, DEFAULT, "unexplained", False),  # it explains a fifth
+        ({"drift": STANDS_STILL._replace(share=0.8)}, DEFAULT, "unexplained", False),
+        ({"white": True}, DEFAULT, "unexplained", False),  # it looks like noise, and varies with time
+        ({"weighed": False}, DEFAULT, "unexplained", False),
+        ({"certain": False}, DEFAULT, "unexplained", False),
+        ({"added": 3}, DEFAULT, "unexplained", False),
+        ({"ranking": (LEADER, ranked("clearance", "engine", 45.0))}, DEFAULT, "unexplained", False),
+        ({"ranking": (LEADER, ranked("clearance", "engine", 45.0, fitted=False))}, DEFAULT, "effect_missing", False),
+        ({"ranking": (LEADER, ranked("viscous_damping", "car_barrier", 49.0))}, DEFAULT, "effect_missing", False),
+        ({"added": 0, "after": left(0.009, 1.0)}, DEFAULT, "adequate", True),
+        ({"added": 0, "after": left(0.05, 1.0)}, DEFAULT, "unexplained", False),
+        ({"before": left(0.04, 1.0)}, DEFAULT, "effect_missing", False),
+        ({"before": left(0.04, 1.0)}, Tolerance(of_peak=0.05), "adequate", True),
+        ({}, Tolerance(of_peak=0.05), "effect_missing", True),
+        ({"after": left(0.05, 2.0, rating=0.7)}, Tolerance(rating=0.8), "effect_missing", False),
+        ({"before": left(0.05, 2.0, rating=0.85)}, Tolerance(rating=0.8), "adequate", True),
+        ({"before": left(0.05, 2.0, rating=None)}, Tolerance(rating=0.8), "effect_missing", True),
+    ],
+)  # fmt: skip
+def test_what_is_said_of_which_evidence(changed, tolerance, word, complete):
+    evidence = EVIDENCE._replace(**changed)
+    if changed.keys() & {"before"} and evidence.after.rms >= evidence.before.rms:
+        evidence = evidence._replace(after=left(0.04, 0.5))
+    assert verdict_on(evidence, tolerance) == (word, complete)
+
+
+def test_a_tolerance_is_a_rating_or_a_share_of_the_peak():
+    assert tolerance_of("0.8") == Tolerance(rating=0.8) and tolerance_of(" 5% ") == Tolerance(of_peak=0.05)
+    for wrong in ("5", "much", "", "-1%", "100%", "0", "nan", "inf%"):
+        with pytest.raises(ModelError, match="0.8.*5%.*got"):
+            tolerance_of(wrong)
+
+
+@pytest.fixture(scope="module")
+def frontal():
+    return diagnose(load_model("frontal_single"), [read_bag(FRONTAL)])
+
+
+def test_a_law_written_another_way_is_named_though_it_leaves_more_than_noise(frontal):
+    """The simulator's unloading is the thesis's; the model file knows of none."""
+    assert (frontal.verdict, frontal.complete, frontal.noise) == ("effect_missing", False, False)
+    assert [(step.effect, step.target) for step in frontal.steps] == [("plastic_unloading", "car_barrier")]
+    assert abs(frontal.steps[0].coefficient / 2e7 - 1.0) < 0.1
+    found = frontal.as_json()
+    assert found["complete"] is False and found["left"]["noise"] is False
+    assert found["tolerance"] == {"of_peak": 0.01, "rating": None, "stated": False}
+    assert {"rms", "unit", "of_peak", "rating", "noise", "where"} <= found["left"].keys()
+    assert found["left"]["of_peak"] == max(one["of_peak"] for one in found["left"]["where"]) < 0.02
+    json.dumps(found)
+
+
+def test_what_is_left_is_that_of_the_residual_below_the_class(frontal):
+    final, left = frontal.models[-1], frontal.left
+    assert left.cfc == 60
+    of_force = next(one for one in left.channels if one.channel == "barrier_fx")
+    output = [output.channel for output in final.fit.layout.outputs].index("barrier_fx")
+    record, residual = final.records[0], final.residuals.residual[0][:, output]
+    one = replace(record.test, channels=tuple(c for c in record.test.channels if c.name == "barrier_fx"))
+    time_ns = np.round(record.time[record.at] * 1e9).astype(np.int64)
+    filtered = filter_recording(Recording(one, time_ns, np.nan_to_num(residual)[:, None]), 60).values[:, 0]
+    assert of_force.rms == pytest.approx(np.sqrt(np.mean(filtered**2)), rel=1e-6) and of_force.unit == "N"
+    assert left.rms**2 + left.above**2 == pytest.approx(final.residuals.rms**2, rel=0.1)  # bands that hardly overlap
+
+
+def test_who_says_how_good_is_good_enough_gets_a_model_that_is_adequate(monkeypatch, capsys, tmp_path):
+    new = tmp_path / "new.yaml"
+    told = [str(FRONTAL), "--model", "frontal_single", "--good-enough", "20%", "--apply", str(new)]
+    monkeypatch.setattr("sys.argv", ["diagnose", *told])
+    with pytest.raises(SystemExit) as ended:
+        command.main()
+    said = capsys.readouterr().out
+    assert ended.value.code == 0 and said.startswith("adequate: what is left") and "20 %" in said
+    assert "nothing added" in said and "effects" not in new.read_text()
+
+
+def test_a_tolerance_that_is_none_is_one_clear_error(monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["diagnose", str(FRONTAL), "--model", "frontal_single", "--good-enough", "fine"])
+    with pytest.raises(SystemExit) as ended:
+        command.main()
+    assert ended.value.code == 2 and "a rating from 0 to 1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("told, applied", [([], False), (["--apply-unexplained"], True)])
+def test_what_is_unexplained_is_applied_only_when_asked_for(monkeypatch, capsys, tmp_path, told, applied):
+    from crash_replay.bag import write_bag
+
+    hidden = draw_case("impactor", ["changing_mass"], 90_000_014)  # outside the vocabulary
+    model, bag, new = tmp_path / "model.yaml", tmp_path / "bag.mcap", tmp_path / "new.yaml"
+    model.write_text(hidden.model_text)
+    write_bag(hidden.record(1.1, 0.5)[0], bag)
+    monkeypatch.setattr("sys.argv", ["diagnose", str(bag), "--model", str(model), "--apply", str(new), *told])
+    with pytest.raises(SystemExit) as ended:
+        command.main()
+    said = capsys.readouterr().out
+    assert ended.value.code == 0 and said.startswith("unexplained") and " explain" in said
+    assert ("effects" in new.read_text()) == applied
+    assert ("--apply-unexplained" in said) != applied
+
+
+def test_a_time_limit_gives_the_best_answer_so_far(frontal):
+    hurried = diagnose(load_model("frontal_single"), [read_bag(FRONTAL)], seconds=1e-3)
+    assert hurried.stopped and not frontal.stopped
+    assert "stopped after 0.001 s" in hurried.text and "stopped" not in frontal.text
+    assert hurried.verdict == "unexplained" and hurried.as_json()["stopped"] is True
+    assert len(hurried.ranking) >= 3 and not any(one.fitted for one in hurried.ranking)  # screened, and said to be so
+
+
+def test_a_time_limit_is_above_zero(monkeypatch, capsys):
+    for wrong in ("0", "-1", "nan", "soon"):
+        monkeypatch.setattr("sys.argv", ["diagnose", str(FRONTAL), "--model", "frontal_single", "--time-limit", wrong])
+        with pytest.raises(SystemExit) as ended:
+            command.main()
+        assert ended.value.code == 2 and "seconds above 0" in capsys.readouterr().err
