@@ -23,7 +23,7 @@ HELP = "keys: " + ", ".join(f"{key} {meaning}" for key, meaning in KEYS.items())
 SEQUENCE = re.compile(
     rb"\x1b(?:\[|O)(?:1;(?P<modifier>\d))?(?P<final>[A-DHF])|\x1b\[(?P<number>[1478])~|\x1b\[[0-9;]*[~A-Za-z]|.", re.S
 )
-"""A key in what xterm and its like send; with a number as tmux, screen and rxvt do; then keys without a meaning here."""
+"""A key in what xterm and its like send; with a number as tmux and rxvt do; then keys without a meaning here."""
 INCOMPLETE = re.compile(rb"\x1b(?:\[[0-9;]*|O)?$")
 ARROWS = {b"A": "up", b"B": "down", b"C": "right", b"D": "left", b"H": "home", b"F": "end"}
 NUMBERED = {b"1": "home", b"4": "end", b"7": "home", b"8": "end"}
