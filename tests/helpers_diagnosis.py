@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import rclpy
 import yaml
-from crash_msgs.msg import Misfit, Ranking, Residuals, Samples, TestInfo
+from crash_msgs.msg import Misfit, Ranking, Revision, Samples, TestInfo
 from helpers_domain import own_domain
 from helpers_other_process import OtherProcesses
 from helpers_waiting import PATIENCE
@@ -24,7 +24,7 @@ from crash_replay.recording import Recording
 from crash_replay.ros_messages import samples_to_msg, test_to_msg
 from crash_replay.synthetic.hidden.cases import HiddenCase, draw_case
 
-TOPICS = {"ranking": Ranking, "misfit": Misfit, "revisions": Residuals}
+TOPICS = {"ranking": Ranking, "misfit": Misfit, "revisions": Revision}
 
 
 @cache
@@ -120,9 +120,9 @@ class Stage:
         return answer.result()
 
 
-def table(message: Residuals, field: str) -> np.ndarray:
+def table(message: Revision, field: str) -> np.ndarray:
     return np.asarray(getattr(message, field)).reshape(len(message.time_ns), -1)
 
 
-def joined(messages: Sequence[Residuals], field: str) -> np.ndarray:
+def joined(messages: Sequence[Revision], field: str) -> np.ndarray:
     return np.concatenate([table(message, field) for message in messages])

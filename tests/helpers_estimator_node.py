@@ -11,7 +11,16 @@ from pathlib import Path
 
 import numpy as np
 import rclpy
-from crash_msgs.msg import EstimatorState, Event, Forces, Parameters, ReplayState, Residuals, Samples, TestInfo
+from crash_msgs.msg import (
+    EstimatorState,
+    Event,
+    Forces,
+    ParametersBlock,
+    ReplayState,
+    ResidualsBlock,
+    Samples,
+    TestInfo,
+)
 from helpers_domain import own_domain
 from helpers_other_process import OtherProcesses
 from helpers_waiting import PATIENCE
@@ -43,7 +52,9 @@ elements:
     velocity: speed
 """
 MODEL = f"{UNDAMPED}    damping: {{estimate: true, initial: 0.0, std: 100.0}}\n"
-TOPICS = {"parameters": Parameters, "residuals": Residuals, "forces": Forces, "events": Event}
+TOPICS = {"parameters": ParametersBlock, "residuals": ResidualsBlock, "forces": Forces, "events": Event}
+BLOCKS = ("parameters", "residuals")
+"""Those that are published below `block`."""
 
 
 class Stage:
@@ -137,7 +148,9 @@ class Stage:
         """To an estimator, under its name."""
         self.heard[name] = {topic: [] for topic in TOPICS}
         for topic, kind in TOPICS.items():
-            self.node.create_subscription(kind, f"{name}/{topic}", self.heard[name][topic].append, STREAM)
+            self.node.create_subscription(
+                kind, f"{name}/{'block/' * (topic in BLOCKS)}{topic}", self.heard[name][topic].append, STREAM
+            )
         states = self.heard[name]["state"] = []
         self.node.create_subscription(EstimatorState, f"{name}/state", states.append, LATCHED)
         return self.heard[name]

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from crash_msgs.msg import Forces, Parameters, Residuals
+from crash_msgs.msg import Forces, ParametersBlock, ResidualsBlock
 from helpers_estimation import oscillator, oscillator_recording
 from numpy.testing import assert_array_equal
 from rclpy.serialization import deserialize_message
@@ -39,7 +39,7 @@ def found(request):
 
 def messages(description, estimates):
     make, columns = EstimateMessages(description), columns_of(estimates)
-    said = {Parameters: make.parameters, Residuals: make.residuals, Forces: make.forces}
+    said = {ParametersBlock: make.parameters, ResidualsBlock: make.residuals, Forces: make.forces}
     return tuple(deserialize_message(of_kind(0, 0, columns), kind) for kind, of_kind in said.items())
 
 

@@ -140,7 +140,7 @@ def test_each_revision_has_its_curves(stage, case, offline):
     messages = [m for m in stage.heard["diagnosis"]["revisions"]]
     after = case[2].time_ns >= 0
     first = int(np.flatnonzero(after)[0])
-    final = [m for m in messages if m.method == "structured_fit"][:2]
+    final = [m for m in messages if m.final][:2]
     assert [m.model for m in final] == ["side", "side + viscous_damping on door_car"]
     for message, fitted in zip(final, offline.models):
         assert message.number == first
@@ -149,7 +149,7 @@ def test_each_revision_has_its_curves(stage, case, offline):
         assert_allclose(joined([message], "measured"), record.measured, rtol=1e-12)
         assert_allclose(joined([message], "predicted"), predicted, rtol=1e-6, atol=1e-6 * np.abs(predicted).max())
         assert_allclose(joined([message], "residual"), record.measured - predicted, atol=1e-6 * np.abs(predicted).max())
-    drawn = [m for m in messages if m.method == "structured_fit so far" and m.model == "side"]
+    drawn = [m for m in messages if not m.final and m.model == "side"]
     assert_array_equal(np.concatenate([m.time_ns for m in drawn]), case[2].time_ns[after])
 
 

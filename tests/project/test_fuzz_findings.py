@@ -225,7 +225,7 @@ def test_bytes_that_are_no_test(raw):
 
 
 def test_an_output_whose_lengths_do_not_fit():
-    message = decoded(cdr(OUTPUT["parameters"]), type(OUTPUT["parameters"]))
+    message = decoded(cdr(OUTPUT["block/parameters"]), type(OUTPUT["block/parameters"]))
     message.value = [1.0]
     assert "value: expected 4 values" in refused(parameter_block, "mrls", message)
 

@@ -41,7 +41,7 @@ class Graph:
         self.now, self.total = 0.0, total
         self.others = Attendance(clock=lambda: self.now, host="here", ended=lambda process: process == 13)
         self.account = Completeness(choice, self.others)
-        kinds = {"/samples": SAMPLES, "/kalman/parameters": PARAMETERS, "/kalman/residuals": RESIDUALS}
+        kinds = {"/samples": SAMPLES, "/kalman/block/parameters": PARAMETERS, "/kalman/block/residuals": RESIDUALS}
         for topic, kind in {**kinds, "/kalman/forces": FORCES, "/diagnosis/ranking": RANKING}.items():
             if choice.wants(topic, kind):
                 self.account.found(topic, kind)
@@ -81,12 +81,12 @@ def test_what_is_missing_is_named_with_how_many_which_and_why():
     graph.replay()
     graph.write(0, 40)
     graph.write(60, 100)
-    graph.write(40, 60, topics="/kalman/parameters")
+    graph.write(40, 60, topics="/kalman/block/parameters")
     graph.account.give_up("/samples", (40, 60), "/replay has left")
     graph.say("/kalman", "estimator", next=100, done=True, reason="2 samples were NaN")
     assert graph.account.missing() == [
         "/samples: 80 of 100, without 40 to 59 (/replay has left)",
-        "/kalman/residuals: 80 of 100, without 40 to 59 (2 samples were NaN)",
+        "/kalman/block/residuals: 80 of 100, without 40 to 59 (2 samples were NaN)",
         "/kalman/forces: 80 of 100, without 40 to 59 (2 samples were NaN)",
         "/diagnosis/ranking: no final answer",
     ]
@@ -95,14 +95,14 @@ def test_what_is_missing_is_named_with_how_many_which_and_why():
 def test_an_estimator_that_was_killed_is_not_waited_for_and_is_named():
     graph = whole()
     graph.say("/mrls", "estimator", next=30, process=13)
-    graph.account.found("/mrls/parameters", PARAMETERS)
+    graph.account.found("/mrls/block/parameters", PARAMETERS)
     graph.write(0, 30, topics="/mrls/")
     assert not graph.account.through("/mrls")
     graph.now = 2.0
     assert graph.account.through("/mrls")
     assert graph.account.missing() == [
-        "/mrls/parameters: 30 of 100, without 30 to 99 (/mrls was killed)",
-        "/mrls/residuals: 0 of 100, without 0 to 99 (/mrls was killed)",
+        "/mrls/block/parameters: 30 of 100, without 30 to 99 (/mrls was killed)",
+        "/mrls/block/residuals: 0 of 100, without 0 to 99 (/mrls was killed)",
     ]
 
 
@@ -156,7 +156,7 @@ def test_who_can_say_nothing_on_this_test_is_not_waited_for_and_is_named():
     graph.say("/mrls", "estimator", next=100, done=True, reason="test T has no channel car_ax")
     assert graph.account.through("/mrls")
     assert graph.account.missing() == [
-        f"/mrls/{name}: 0 of 100, without 0 to 99 (test T has no channel car_ax)"
+        f"/mrls/block/{name}: 0 of 100, without 0 to 99 (test T has no channel car_ax)"
         for name in ("parameters", "residuals")
     ]
 
@@ -188,7 +188,7 @@ def test_of_many_gaps_the_first_are_listed():
 
 
 def test_what_was_not_to_be_recorded_is_not_missing():
-    graph = whole(Choice(topics=["/kalman/parameters", "test"], exclude=[]))
+    graph = whole(Choice(topics=["/kalman/block/parameters", "test"], exclude=[]))
     assert graph.account.missing() == ["no topic fits test (parameter topics)"]
     graph.account.found("/test", "crash_msgs/msg/TestInfo")
     assert graph.account.missing() == []

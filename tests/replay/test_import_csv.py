@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from crash_replay.bag import read_bag, time_zero_ns, write_bag
 from crash_replay.readers import read_source
 from crash_replay.readers.units import FACTORS, quantity_of, si_factor
 from crash_replay.recording import SI_UNIT, RecordingError
@@ -42,6 +43,30 @@ def error(path, **options):
         read_source(path, **options)
     assert "\n" not in str(raised.value)
     return str(raised.value).removeprefix(str(path.parent) + "/")
+
+
+@pytest.mark.parametrize(
+    ("date", "second"),
+    [("2019-05-04", 1_556_928_000), ('"2019-05-04 14:30"', 1_556_980_200), ("04.05.2019", 1_556_928_000)],
+)
+def test_the_date_of_a_test_is_that_of_its_stamps(tmp_path, date, second):
+    recording = read_source(write(tmp_path, description=YAML.replace("source: lab", f"source: lab, date: {date}")))
+    assert recording.test.impact_ns == time_zero_ns(recording) == second * 10**9
+    again = read_bag(write_bag(recording, tmp_path / "b.mcap"))
+    assert again.test.impact_ns == second * 10**9
+    assert_array_equal(again.time_ns, recording.time_ns)
+
+
+def test_a_test_without_a_date_has_stamps_of_1970(tmp_path):
+    recording = read_source(write(tmp_path))
+    assert recording.test.impact_ns == 0 and time_zero_ns(recording) == 2 * 10**9
+    assert read_bag(write_bag(recording, tmp_path / "b.mcap")).test.impact_ns == 0
+
+
+@pytest.mark.parametrize("date", ["yesterday", "13-04-2019", "1066-10-14", "2101-01-01"])
+def test_what_is_no_date_is_said(tmp_path, date):
+    path = write(tmp_path, description=YAML.replace("source: lab", f"source: lab, date: {date}"))
+    assert f"test.date: expected a date such as 2019-05-04 or 2019-05-04 14:30, got '{date}'" in error(path)
 
 
 def test_values_units_signs_and_what_is_left_out(tmp_path):

@@ -58,6 +58,7 @@ def test_folder(tmp_path, encoding):
     recording = read_source(write_folder(tmp_path, encoding=encoding))
     test = recording.test
     assert (test.id, test.title, test.source) == ("T7", "Überprüfung", "A lab, 2026-05-14, T7.MME")
+    assert test.impact_ns == 1_778_716_800 * 10**9, "midnight of that date, UTC"
     assert_array_equal(recording.time_ns, np.arange(-2, 3) * 100_000)
     assert [(c.name, c.body, c.axis) for c in test.channels] == [
         ("car_ax", "car", "x"),

@@ -199,6 +199,7 @@ def write_folder(folder, sensors=SENSORS):
 
 def test_small_folder_with_every_trap(tmp_path):
     recording = read_source(write_folder(tmp_path))
+    assert recording.test.impact_ns == 1_506_988_800 * 10**9, "midnight of the 3rd of October 2017, UTC"
     assert_array_equal(recording.time_ns, np.arange(-2, 3) * 100_000)
     assert recording.test.channel_names == (
         "car_ax", "barrier_fx", "driver_head_ax", "floor_left_ax", "floor_right_ax", "engine_top_ax"

@@ -23,6 +23,9 @@ from crash_replay.keys import decode, next_rate
         (b"\x1b[A\x1b[D", ["up", "left"]),
         (b"\x1bOC", ["right"]),
         (b"\x1b[1;2C", ["shift+right"]),
+        (b"\x1b[H\x1b[F", ["home", "end"]),  # as xterm sends them,
+        (b"\x1b[1~\x1b[4~", ["home", "end"]),  # as tmux and screen do,
+        (b"\x1b[7~\x1b[8~", ["home", "end"]),  # as rxvt does
         (b"\x1b[15~7", ["7"]),  # F5 means nothing
         ("l é".encode(), ["l", "space", "Ã", "©"]),
     ],
@@ -88,6 +91,9 @@ def test_a_replay_follows_the_keys_and_leaves_the_terminal_as_it_was(tmp_path):
         terminal.press(b"\x1b[1;2C", "sample 11 of 40")
         terminal.press(b"\x1b[D", "sample 10 of 40")
         terminal.press(b"5", "sample 20 of 40")
+        terminal.press(b"\x1b[4~", "sample 39 of 40")
+        terminal.press(b"\x1b[1~", "sample 0 of 40")
+        terminal.press(3 * b"\x1b[1;2C", "sample 30 of 40")
         terminal.press(b"\x1b[A", "rate 0.002")
         terminal.press(b"l", "loop")
         terminal.press(b"x", "no such key: 'x'")

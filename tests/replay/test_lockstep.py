@@ -125,9 +125,9 @@ def test_runs_with_load_and_without_record_the_same_messages(tmp_path):
     assert all("121 samples sent in 121 messages" in run for run in runs)
     first, *others = [messages_by_topic(file) for file in files]
     assert all(other == first for other in others)
-    assert [len(first[f"/{name}"]) for name in ("samples", "mrls/parameters", "constrained_kalman/parameters")] == [
-        121
-    ] * 3
+    assert [
+        len(first[f"/{name}"]) for name in ("samples", "mrls/block/parameters", "constrained_kalman/block/parameters")
+    ] == [121] * 3
 
 
 def run_recorded_to(file: Path) -> str:

@@ -121,6 +121,40 @@ def test_a_pause_drops_the_rest_of_a_burst():
     assert run(player.pause(0.0), 0.0, 1.0)[1] == []
 
 
+def test_steps_add_up():
+    """Three keys pressed before the first step is sent are three steps, there and back."""
+    far = Player(np.arange(50, dtype=np.int64) * MS)
+    three = far.step(10, 0.0).step(10, 0.0).step(10, 0.0)
+    player, batches = run(three, 0.0, 0.01, block=4)
+    assert numbers(batches) == list(range(30)) and player.mode == Mode.PAUSED
+    half, _ = far.step(10, 0.0).take(0.0, 4)
+    assert numbers(run(half.step(-2, 0.0), 0.0, 0.01)[1]) == [4, 5, 6, 7]  # there were six to send
+    back = half.step(-8, 0.0)
+    assert (back.next, back.pending, back.run) == (2, 0, 1)
+    assert numbers(run(far.burst(10, 0.0).burst(5, 0.0), 0.0, 0.01)[1]) == list(range(15))
+
+
+def test_a_burst_of_nothing_is_of_all_that_are_left():
+    player, _ = run(Player(TEN).step(3, 0.0), 0.0, 0.01)
+    player, batches = run(player.burst(0, 1.0), 1.0, 1.01)
+    assert numbers(batches) == list(range(3, 10)) and player.mode == Mode.FINISHED
+    with pytest.raises(CommandError, match="no sample is left"):
+        player.burst(0, 2.0)
+
+
+def test_a_position_is_where_the_replay_is_now():
+    player = Player(TEN, rate=0.5)
+    assert player.position_ns(0.0) == TEN[0]
+    player, _ = run(player.resume(0.0), 0.0, 0.0041)  # the samples at 0, 1 and 2 ms
+    assert player.position_ns(0.005) == TEN[0] + round(2.5 * MS)
+    assert player.position_ns(9.0) == TEN[3]  # not beyond what is to be sent
+    paused = player.pause(0.005)
+    assert paused.position_ns(7.0) == TEN[0] + round(2.5 * MS)
+    assert paused.seek(TEN[8].item(), 7.0).position_ns(7.0) == TEN[8]
+    finished, _ = run(player.burst(0, 1.0), 1.0, 1.1)
+    assert finished.position_ns(2.0) == TEN[9]
+
+
 def test_a_burst_beyond_the_end_finishes():
     player, batches = run(Player(TEN).burst(99, 0.0), 0.0, 0.01)
     assert numbers(batches) == list(range(10))
@@ -286,6 +320,16 @@ def test_the_present_rate_is_that_of_the_last_second_of_playing():
     assert_allclose(tally.rate_now(), 0.2)
     assert_allclose(tally.rate, 0.6, rtol=0.01)  # of all
     assert_allclose(tally.rate_now(late=1.0), 0.1, rtol=0.05)  # a subscriber holds it up
+
+
+def test_the_present_rate_forgets_another_one():
+    anchor, tally = Anchor(0.0, 0), Tally()
+    for k in range(50):
+        tally.count(Batch(k, k + 1, 0, 0.01 * k, anchor), 10 * k * MS, 0.01 * k)
+    tally.forget_recent()
+    for k in range(50, 60):
+        tally.count(Batch(k, k + 1, 0, 0.01 * k, anchor), 10 * k * MS, 0.49 + 0.1 * (k - 49))
+    assert_allclose(tally.rate_now(), 0.1)
 
 
 def test_the_present_rate_is_known_where_less_than_one_message_is_sent_in_a_second():

@@ -13,7 +13,7 @@ from threading import Event, Thread
 
 import pytest
 from crash_msgs.msg import Attendance as Word
-from crash_msgs.msg import Parameters, Ranking, Residuals
+from crash_msgs.msg import ParametersBlock, Ranking, ResidualsBlock
 from crash_msgs.srv import GetEstimates, Step
 from helpers_replay import DOMAIN, Listener, Replay, environment, some_recording, wait_until
 from helpers_waiting import PATIENCE
@@ -74,12 +74,12 @@ class Estimator(Listener):
         super().__init__(name)
         self.next, self.silent_from = 0, silent_from
         node = self.node
-        self.out = [node.create_publisher(kind, f"~/{topic}", STREAM) for kind, topic in self.kinds.items()]
+        self.out = [node.create_publisher(kind, f"~/block/{topic}", STREAM) for kind, topic in self.kinds.items()]
         node.create_service(GetEstimates, "~/get_estimates", self._again)
         self.attending = Attending(node, "estimator", self._progress)
         self.executor.wake()
 
-    kinds = {Parameters: "parameters", Residuals: "residuals"}
+    kinds = {ParametersBlock: "parameters", ResidualsBlock: "residuals"}
 
     def _progress(self) -> Progress:
         total = self.tests[-1].samples if self.tests else 0
@@ -162,7 +162,12 @@ def test_all_that_was_said_is_in_the_file_and_it_replays(bag, tmp_path):
     assert (status, errors) == (0, "")
     found = messages(file)
     assert output == f"{file}: {found.total()} messages on {len(found)} topics, complete"
-    assert [found[topic] for topic in ("/test", "/samples", "/fake/parameters", "/fake/residuals")] == [1, 40, 40, 40]
+    assert [found[topic] for topic in ("/test", "/samples", "/fake/block/parameters", "/fake/block/residuals")] == [
+        1,
+        40,
+        40,
+        40,
+    ]
     assert found["/attendance"] and found["/replay_state"]
     assert not any(topic.startswith("/channels") or topic == "/clock" for topic in found)
     assert says_of_itself(file) == {"complete": "true", "missing": ""}
@@ -206,8 +211,8 @@ def test_what_an_estimator_said_and_did_not_come_is_asked_for_and_what_it_cannot
             assert replay.end()[0] == 0
         status, _, errors = record.end()
     assert status == 1
-    assert "; /fake/parameters: 36 of 40, without 36 to 39 (samples 39 to 39 have not all been seen); " in errors
-    assert messages(file)["/fake/parameters"] == 20 + 4  # 4 estimates in an answer
+    assert "; /fake/block/parameters: 36 of 40, without 36 to 39 (samples 39 to 39 have not all been seen); " in errors
+    assert messages(file)["/fake/block/parameters"] == 20 + 4  # 4 estimates in an answer
 
 
 @contextmanager

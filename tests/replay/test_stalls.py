@@ -35,7 +35,9 @@ def whole():
 def victim_and_replay(stage, **parameters) -> tuple[subprocess.Popen, subprocess.Popen]:
     stage.listen("victim")
     victim = stage.start("crash_estimator.nodes.estimator_node", "victim", model=MODEL, method="mrls")
-    stage.spin_until(lambda: stage.node.count_publishers("victim/parameters"), "the victim is found", 2 * PATIENCE)
+    stage.spin_until(
+        lambda: stage.node.count_publishers("victim/block/parameters"), "the victim is found", 2 * PATIENCE
+    )
     stage.spin(1.0)  # it finds the stage a moment later: what it says before is heard by nobody
     waiting = {"listeners": "[victim]", "wait_timeout": 100.0, "wait_for": 2}
     replay = stage.replay(BAG, rate=0.1, stderr=subprocess.PIPE, **waiting | parameters)

@@ -31,10 +31,10 @@ NAMES = ("mrls", "ckf")
 SAMPLES = 240
 """Enough for every view; each comes in three messages of each estimator and takes some 2 ms to be drawn."""
 FINISHED = msg.ReplayState(state=msg.ReplayState.FINISHED, number=SAMPLES, total=SAMPLES)
-TOPIC_OF = {ParameterBlock: "parameters", ResidualBlock: "residuals", ForceBlock: "forces"}
+TOPIC_OF = {ParameterBlock: "block/parameters", ResidualBlock: "block/residuals", ForceBlock: "forces"}
 
 
-def message_of(block: Block) -> msg.Parameters | msg.Residuals | msg.Forces:
+def message_of(block: Block) -> msg.ParametersBlock | msg.ResidualsBlock | msg.Forces:
     """The message that an estimator would send: every field that message and block have in common."""
     message = viewer_messages.BLOCK_OF[TOPIC_OF[type(block)]][0]()
     for field, kind in message.get_fields_and_field_types().items():
@@ -53,7 +53,7 @@ class Stage(Node):
 
     def __init__(self) -> None:
         super().__init__("stage")
-        kinds = {"parameters": msg.Parameters, "residuals": msg.Residuals, "forces": msg.Forces, "events": msg.Event}
+        kinds = {topic: kind for topic, (kind, _) in viewer_messages.BLOCK_OF.items()}
         self.out = {(n, t): self.create_publisher(k, f"{n}/{t}", STREAM) for n in NAMES for t, k in kinds.items()}
         self.test = self.create_publisher(msg.TestInfo, "test", LATCHED)
         self.state = self.create_publisher(msg.ReplayState, "replay_state", LATCHED)

@@ -31,7 +31,9 @@ SAME_CLOCK = 0.75
 
 
 def time_zero_ns(recording: Recording) -> int:
-    """Stamp of the impact: whole seconds, so late that the first sample's stamp is 1 s or more."""
+    """Stamp of the impact: its date; else whole seconds, so late that the first sample's stamp is 1 s or more."""
+    if recording.test.impact_ns:
+        return recording.test.impact_ns
     before = max(0, -int(recording.time_ns[0]))
     return SECOND * (1 + -(-before // SECOND))
 

@@ -26,7 +26,7 @@ def aligned(at: int, size: int) -> int:
 
 
 class Serialized:
-    """Bytes of a message; `numbers` are views into them, by field: "number", "value", "header.stamp.sec"."""
+    """Bytes of a message; `numbers` are views into them, by field: "number", "header.stamp.sec", "entries[2].value"."""
 
     def __init__(self, message: Any):
         self._bytes = bytearray(serialize_message(message))
@@ -39,8 +39,8 @@ class Serialized:
     def _find(self, message: Any, prefix: str, at: int) -> int:
         """Where the numbers of a message that begins at `at` are -> where it ends."""
         for field, kind in message.get_fields_and_field_types().items():
-            elements = [getattr(message, field)]
-            if kind.startswith("sequence<"):
+            elements, many = [getattr(message, field)], kind.startswith("sequence<")
+            if many:
                 kind, elements = kind.removeprefix("sequence<").removesuffix(">"), elements[0]
                 at = aligned(at, 4) + 4
             if kind in NUMBERS:
@@ -52,8 +52,8 @@ class Serialized:
                 for text in elements:
                     at = aligned(at, 4) + 4 + len(text.encode()) + 1
             else:
-                for element in elements:
-                    at = self._find(element, f"{prefix}{field}.", at)
+                for k, element in enumerate(elements):
+                    at = self._find(element, f"{prefix}{field}{f'[{k}]' * many}.", at)
         return at
 
     def set_stamp(self, time_ns: int) -> None:

@@ -11,7 +11,7 @@ from .numbers import Numbers, Span
 from .recorded_topics import NUMBERED, SAMPLES, About, Choice
 
 ESTIMATOR, DIAGNOSIS = "estimator", "diagnosis"
-ESTIMATES = {"parameters": "Parameters", "residuals": "Residuals", "forces": "Forces"}
+ESTIMATES = {"block/parameters": "ParametersBlock", "block/residuals": "ResidualsBlock", "forces": "Forces"}
 """Last parts of an estimator's topics, and their types; forces are not said by all."""
 SILENT_FOR = 300.0
 """s of silence after which a node is no longer waited for."""

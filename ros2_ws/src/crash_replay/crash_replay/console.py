@@ -130,6 +130,8 @@ class Console:
         elif key.isdecimal() or key == "home":
             share = 0.0 if key == "home" else int(key) / 10
             pacing.command(Player.seek, player.time_ns.item(player.first + int(share * (player.end - player.first))))
+        elif key == "end":
+            pacing.command(Player.seek, player.time_ns.item(player.end - 1))
         elif key == "l":
             return self.set_parameters({"loop": not player.loop})
         elif key in ("a", "b"):

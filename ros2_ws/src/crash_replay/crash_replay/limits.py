@@ -38,6 +38,7 @@ BYTES = Range(0, 2**30, "bytes", "of the numbers of one test: several processes 
 TIME = Range(-1e4, 1e4, "s", "since the impact: a crash lasts less than a second, a stamp counts to 2^31 s")
 PERIOD = Range(1e-9, 10.0, "s", "between two samples: a stamp counts whole ns; seldomer than that is no crash")
 STAMP = Range(0, 2**31 - 2 * TIME.highest, "s", "of the impact: with the time since it, it still is a ROS stamp")
+UNDATED = Range(0, 365 * 86_400, "s", "stamp of an impact of which nobody knows the date")
 VELOCITY = Range(-1e4, 1e4, "m/s", "thirty times the speed of sound")
 DISPLACEMENT = Range(-1e4, 1e4, "m", "at time zero, between parts of one test")
 VALUE = Range(-1e12, 1e12, "", "in SI units: its square times a thousand samples is still exact enough to compute with")

@@ -86,10 +86,15 @@ def test_from_msg(message: Any) -> Test:
         dict(zip(bodies, map(float, message.initial_velocity))),
         dict(zip(bodies, map(float, message.initial_displacement))),
         tuple(message.notes),
+        _impact_ns(message.time_zero),
     )
 
 
 test_from_msg.__test__ = False  # not a pytest function
+
+
+def _impact_ns(time_zero: Any) -> int:
+    return time_zero.sec * 1_000_000_000 + time_zero.nanosec if time_zero.sec > limits.UNDATED.highest else 0
 
 
 def _what_is_wrong(message: Any) -> str:

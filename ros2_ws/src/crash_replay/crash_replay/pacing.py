@@ -82,7 +82,10 @@ class Pacing:
     def command(self, command: Callable[..., Player], *arguments) -> None:
         """Put the player that a method of Player gives in the place of the present one."""
         with self.changed:
+            rate = self.player.rate
             self.player = command(self.player, *arguments, time.perf_counter())
+            if self.player.rate != rate:
+                self.tally.forget_recent()
             self.block = self._block(self.player)
             self.state_due = 0.0
             self.changed.notify_all()
@@ -185,8 +188,8 @@ class Pacing:
         return self.player.late(time.perf_counter(), self.block)
 
     def rate_now(self) -> float:
-        """Times real time, over the last second of playing."""
-        return self.tally.rate_now(self.late())
+        """Times real time, over the last second of playing; 0 while it does not play."""
+        return self.tally.rate_now(self.late()) if self.player.mode == Mode.PLAYING else 0.0
 
     def _block(self, player: Player) -> int:
         channels = len(self.recording.test.channels)

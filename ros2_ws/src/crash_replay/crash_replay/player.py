@@ -124,18 +124,30 @@ class Player:
         return self._at(number, now, Mode.PLAYING if self.mode == Mode.PLAYING else Mode.PAUSED)
 
     def step(self, n: int, now: float) -> Self:
-        """Pause; send n samples at once (n > 0), or go back by -n as a new run, at most to the first (n < 0)."""
+        """Pause; send n samples at once (n > 0), or go back by -n as a new run, at most to the first (n < 0).
+
+        Steps add up: what earlier ones have yet to send is sent as well, or taken off the way back.
+        """
+        n += self.pending
         if n >= 0:
-            return self.burst(n, now)
+            return self._send_at_once(n, now)
         if self.next == self.first:
             raise CommandError(f"cannot go back: sample {self.first} is the first")
         return self._at(max(self.first, self.next + n), now, Mode.PAUSED)
 
     def burst(self, n: int, now: float) -> Self:
-        """Pause; send n samples at once."""
+        """Pause; send n samples at once beside those that are still to be sent, or all that are left (0)."""
+        return self._send_at_once(self.pending + n if n else max(1, self.end - self.next), now)
+
+    def _send_at_once(self, n: int, now: float) -> Self:
         if self.mode == Mode.FINISHED and n:
             raise CommandError(f"no sample is left: sample {self.end - 1} was the last; go back, seek or resume first")
         return replace(self.pause(now), pending=n, anchor=None if n else self._reached(now))
+
+    def position_ns(self, now: float) -> int:
+        """Where the replay is, ns since the impact: on the way to the next sample, or at the last of all."""
+        reached = self._reached(now)
+        return round(reached.time_ns) if reached else self._time_ns(min(self.next, self.end - 1))
 
     def due(self, block: int = 1) -> float | None:
         """Wall time in s at which the next `block` samples are to be sent; -inf: at once; None: not before a command.
@@ -239,6 +251,10 @@ class Tally:
         self.recent.append((self.played, self.took))
         while len(self.recent) > 2 and self.took - self.recent[1][1] > NOW:
             self.recent.popleft()
+
+    def forget_recent(self) -> None:
+        """The rate that is asked for is another one: what was kept before says nothing of it."""
+        self.recent = deque([(self.played, self.took)])
 
     @property
     def rate(self) -> float:

@@ -17,7 +17,7 @@ from threading import Event, Thread
 from typing import NamedTuple
 
 import rclpy
-from crash_msgs.msg import Parameters, Samples, TestInfo
+from crash_msgs.msg import ParametersBlock, Samples, TestInfo
 from mcap.reader import make_reader
 from rclpy.context import Context
 from rclpy.node import Node
@@ -58,11 +58,11 @@ class Source:
     def __init__(self, node: Node):
         test = node.create_publisher(TestInfo, "test", LATCHED)
         test.publish(TestInfo(id="T", samples=10**9))
-        names = {"samples": Samples} | {f"e{k}/parameters": Parameters for k in range(ESTIMATORS)}
+        names = {"samples": Samples} | {f"e{k}/block/parameters": ParametersBlock for k in range(ESTIMATORS)}
         self.publishers = {f"/{name}": node.create_publisher(kind, name, STREAM) for name, kind in names.items()}
         more = {"name": ["a"] * 5, "unit": ["N/m"] * 5, "value": [1.0] * 5, "std": [1.0] * 5, "status": [0] * 5}
         self.messages = {
-            f"/{name}": Serialized(kind(time_ns=[0], **(more if kind is Parameters else {"values": [1.0] * 16})))
+            f"/{name}": Serialized(kind(time_ns=[0], **(more if kind is ParametersBlock else {"values": [1.0] * 16})))
             for name, kind in names.items()
         }
         self.stamps: list[int] = []  # ns, by number; the same on all topics

@@ -8,14 +8,16 @@ from typing import NamedTuple
 from .channel_messages import CARRIERS, SECOND
 
 SAMPLES, PARAMETERS, RESIDUALS, FORCES = (
-    f"crash_msgs/msg/{name}" for name in ("Samples", "Parameters", "Residuals", "Forces")
+    f"crash_msgs/msg/{name}" for name in ("Samples", "ParametersBlock", "ResidualsBlock", "Forces")
 )
-TEST, RANKING = "crash_msgs/msg/TestInfo", "crash_msgs/msg/Ranking"
-NUMBERED = {SAMPLES, PARAMETERS, RESIDUALS, FORCES}
+TEST, RANKING, REVISION = (f"crash_msgs/msg/{name}" for name in ("TestInfo", "Ranking", "Revision"))
+NUMBERED = {SAMPLES, PARAMETERS, RESIDUALS, FORCES, REVISION}
 """Messages that say which samples they are about."""
+NAMED = {"crash_msgs/msg/Parameters", "crash_msgs/msg/Residuals"}
+"""Of one sample each, made only while somebody listens: the blocks hold the same."""
 CHANNELS, CLOCK = {carrier.type for carrier in CARRIERS.values()}, "rosgraph_msgs/msg/Clock"
 WITHOUT_STAMP = {TEST, "crash_msgs/msg/Answer", "crash_msgs/msg/Attendance"}
-STAMPED = NUMBERED | {
+STAMPED = NUMBERED | NAMED | {
     *CHANNELS, CLOCK, RANKING, "crash_msgs/msg/Misfit", "crash_msgs/msg/Event", "crash_msgs/msg/EstimatorState",
     "crash_msgs/msg/ReplayState", "diagnostic_msgs/msg/DiagnosticArray",
 }  # fmt: skip
@@ -30,13 +32,13 @@ BEGINNING = 4
 class Choice(NamedTuple):
     """Names or patterns such as /kalman/*, with or without the first slash."""
 
-    topics: Sequence[str] = ()  # none: all but those that hold what `samples` holds as well
+    topics: Sequence[str] = ()  # none: all but those that hold what `samples` and the blocks hold as well
     exclude: Sequence[str] = ()
 
     def wants(self, name: str, kind: str) -> bool:
         if kind not in STAMPED | WITHOUT_STAMP or (kind in CHANNELS and "/channels/" not in name):
             return False
-        chosen = fits(name, self.topics) if self.topics else kind not in CHANNELS | {CLOCK}
+        chosen = fits(name, self.topics) if self.topics else kind not in CHANNELS | NAMED | {CLOCK}
         return chosen and not fits(name, self.exclude)
 
     def in_vain(self, names: Iterable[str]) -> list[str]:

@@ -78,6 +78,7 @@ class Test:
     initial_velocity: Mapping[str, float] = field(default_factory=dict)  # body -> m/s, at time zero and before
     initial_displacement: Mapping[str, float] = field(default_factory=dict)  # body -> m at time zero
     notes: tuple[str, ...] = ()  # what the import did and left out
+    impact_ns: int = 0  # when it was: ns since 1970, UTC; 0: not known
 
     __test__ = False  # not a pytest class
 

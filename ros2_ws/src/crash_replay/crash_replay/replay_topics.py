@@ -123,6 +123,7 @@ class ReplayTopics:
     def send_state(self, player: Player, tally: Tally, block: int, rate: float) -> None:
         """rate: kept now, times real time."""
         self.find_subscribers()
+        position_ns = player.position_ns(time.perf_counter())
         if self.flow.acknowledged():
             self.acknowledged = tally.samples
         reached = Progress(player.run, len(self.recording), player.next, done=player.mode == Mode.FINISHED)
@@ -135,7 +136,7 @@ class ReplayTopics:
             acknowledged=self.acknowledged,
             # who was killed is looked for only where there is time for it
             subscribers=self.audience.ready() if player.mode == Mode.WAITING else self.samples.get_subscription_count(),
-            time=self.last_time_ns / SECOND,
+            time=position_ns / SECOND,
             rate_asked=player.rate,
             rate_actual=rate,
             worst_lateness=tally.worst_lateness,
@@ -143,5 +144,5 @@ class ReplayTopics:
             first=self.first if player.run == self.run else player.next,
             listeners=self.audience.look(reached),
         )
-        message.header.stamp = stamp(self.time_zero + self.last_time_ns)
+        message.header.stamp = stamp(self.time_zero + position_ns)
         self.state.publish(message)

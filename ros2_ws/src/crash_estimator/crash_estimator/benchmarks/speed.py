@@ -26,7 +26,7 @@ QUICK = Effort(
     singles=0.1, blocks=0.5, seen=0.5, turns=1, rounds=1, hold=1.0, probe=0.5, rates=(2e3,), latency=200, jitter=0.3,
     lockstep=2,
 )  # fmt: skip
-PARTS = ("steps", "growth", "throughput", "latency", "jitter", "viewer", "real_time", "lockstep")
+PARTS = ("steps", "growth", "throughput", "latency", "jitter", "viewer", "named", "real_time", "lockstep")
 
 ABOUT = """\
 # Speed

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import rclpy
-from crash_msgs.msg import Parameters, Residuals, Samples, TestInfo
+from crash_msgs.msg import Parameters, ParametersBlock, Residuals, ResidualsBlock, Samples, TestInfo
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -25,6 +25,8 @@ from ..demo.children import Child, Children
 
 PATIENCE = 60.0
 """s for a node to come; the first one may have to compile."""
+TOPICS = {"block/parameters": ParametersBlock, "block/residuals": ResidualsBlock}
+"""What an estimator says of every sample, whoever listens."""
 SENT = re.compile(r"(\d+) samples sent in (\d+) messages, rate ([\d.e+-]+) of")
 
 
@@ -51,19 +53,25 @@ class Listener(Node):
 
     def __init__(self, names: Sequence[str]):
         super().__init__("listener")
-        self.counts = {name: {"parameters": 0, "residuals": 0} for name in names}
+        self.counts = {name: dict.fromkeys(TOPICS, 0) for name in names}
         self.first = self.last = 0.0
         self.arrival: dict[int, float] = {}  # number -> when the parameters came
         for name in names:
-            for topic, kind in (("parameters", Parameters), ("residuals", Residuals)):
+            for topic, kind in TOPICS.items():
                 take = lambda message, name=name, topic=topic: self._take(name, topic, message)  # noqa: E731
                 self.create_subscription(kind, f"{name}/{topic}", take, EVERY_SAMPLE)
 
-    def _take(self, name: str, topic: str, message: Parameters | Residuals) -> None:
+    def hear_named(self) -> None:
+        """What is said by name too; it is not counted."""
+        for name in self.counts:
+            for topic, kind in (("parameters", Parameters), ("residuals", Residuals)):
+                self.create_subscription(kind, f"{name}/{topic}", lambda message: None, EVERY_SAMPLE)
+
+    def _take(self, name: str, topic: str, message: ParametersBlock | ResidualsBlock) -> None:
         self.last = time.perf_counter()
         self.first = self.first or self.last
         self.counts[name][topic] += len(message.time_ns)
-        if topic == "parameters":
+        if topic == "block/parameters":
             self.arrival[message.number] = self.last
 
     @property

@@ -107,7 +107,7 @@ class Live:
         part = recording.time_ns[:1000], recording.values[:1000]
         return 1000.0 / per_call(lambda: estimator.follow(estimator.init(), *part))
 
-    def _pass(self, bag: Path, block: int, relay: bool = False, viewer: bool = False) -> Pass:
+    def _pass(self, bag: Path, block: int, relay: bool = False, viewer: bool = False, named: bool = False) -> Pass:
         with self.graph(("node",)) as graph:
             if relay:
                 graph.relay("node", **SIZES)
@@ -118,6 +118,8 @@ class Live:
                     "viewer", "crash_estimator", "viewer", open=False, rrd=str(graph.children.logs / "seen.rrd")
                 )
             graph.settle()
+            if named:
+                graph.listener.hear_named()
             if viewer:
                 graph.spin_until(lambda: graph.listener.count_subscribers("/node/forces") > 0, "the viewer listens")
             return graph.replay(bag, 1 + viewer, rate=FLAT_OUT, block=block)
@@ -130,6 +132,14 @@ class Live:
         what = "the viewer's cost on the estimator's throughput, in a rush: forces are made and all is drawn after it"
         said = f"{with_it:,.0f} /s with it", f"{without:,.0f} /s without"
         yield Row(what, *said, 1.0 - ratio(rounds, 1, 0), 0.05, least=False)
+
+    def named(self) -> Iterator[Row]:
+        bag = self.bag(4, self.effort.singles, 10e3)
+        passes = (lambda on=on: self._pass(bag, block=1, named=on).per_second for on in (False, True))
+        rounds = self._in_turns(*passes)
+        without, with_it = np.median(rounds, axis=0)
+        what = "samples a second, single messages, while somebody listens to parameters and residuals by name as well"
+        yield Row(what, f"{with_it:,.0f} /s", f"{without:,.0f} /s to blocks alone", ratio(rounds, 1, 0))
 
     def real_time(self) -> Iterator[Row]:
         """Rates are tried in turn; the highest that is kept is held for the whole time."""

@@ -81,4 +81,4 @@ def _call(graph: Graph, kind: type, service: str, request) -> None:
 def said(file: Path) -> dict[str, list[tuple[int, bytes]]]:
     """Stamps and bytes of the messages with parameters and residuals, by topic."""
     found = messages_by_topic(file)
-    return {topic: messages for topic, messages in found.items() if topic.endswith(("/parameters", "/residuals"))}
+    return {topic: messages for topic, messages in found.items() if "/block/" in topic}

@@ -8,7 +8,7 @@ from array import array
 from functools import lru_cache
 
 import rclpy
-from crash_msgs.msg import Forces, Parameters, Residuals, Samples
+from crash_msgs.msg import Forces, ParametersBlock, ResidualsBlock, Samples
 from rclpy.executors import ExternalShutdownException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -19,24 +19,24 @@ from crash_replay.qos import EVERY_SAMPLE, STREAM
 from crash_replay.ros_runtime import spin
 
 FIELDS = {
-    Parameters: {"name": "", "value": 1, "std": 1, "status": 0},
-    Residuals: {
+    ParametersBlock: {"name": "", "value": 1, "std": 1, "status": 0},
+    ResidualsBlock: {
         "name": "", "measured": 1, "predicted": 1,
         "innovation": 1, "innovation_std": 1, "residual": 1, "residual_std": 1,
     },
     Forces: {"element": "", "crush": 1, "rate": 1, "force": 1, "force_std": 1, "state": 0},
 }  # fmt: skip
 """Message -> its fields of one value a row: a name, a double or a byte."""
+TOPICS = {ParametersBlock: "block/parameters", ResidualsBlock: "block/residuals", Forces: "forces"}
 OF_BODIES = ("displacement", "velocity", "acceleration")
 
 
 class Relay(Node):
     def __init__(self) -> None:
         super().__init__("relay")
-        width = {kind: self.declare_parameter(kind.__name__.lower(), 1).value for kind in FIELDS}
+        width = {kind: self.declare_parameter(topic.rpartition("/")[2], 1).value for kind, topic in TOPICS.items()}
         self.width, self.bodies = width, self.declare_parameter("bodies", 1).value
-        topics = {kind: kind.__name__.lower() for kind in FIELDS}
-        self.out = {kind: self.create_publisher(kind, f"~/{topic}", STREAM) for kind, topic in topics.items()}
+        self.out = {kind: self.create_publisher(kind, f"~/{topic}", STREAM) for kind, topic in TOPICS.items()}
         self.create_subscription(Samples, "samples", self._on_samples, EVERY_SAMPLE)
 
     @lru_cache(maxsize=16)

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from crash_msgs.msg import Parameters, Ranking, Samples
+from crash_msgs.msg import ParametersBlock, Ranking, Samples
 from mcap.reader import make_reader
 from rclpy.serialization import deserialize_message
 
-KINDS = {f"crash_msgs/msg/{kind.__name__}": kind for kind in (Samples, Parameters, Ranking)}
+KINDS = {f"crash_msgs/msg/{kind.__name__}": kind for kind in (Samples, ParametersBlock, Ranking)}
 
 
-def estimates_in(message: Parameters) -> Iterator[tuple[int, str]]:
+def estimates_in(message: ParametersBlock) -> Iterator[tuple[int, str]]:
     """Number of each sample of the block, and a digest of what is estimated after it."""
     return _by_number(message, message.value, message.std, message.status)
 
@@ -49,7 +49,7 @@ def says_incomplete(file: Path) -> bool:
         return any(record.metadata.get("complete") == "false" for record in make_reader(stream).iter_metadata())
 
 
-def _by_number(message: Samples | Parameters, *columns: array) -> Iterator[tuple[int, str]]:
+def _by_number(message: Samples | ParametersBlock, *columns: array) -> Iterator[tuple[int, str]]:
     count = len(message.time_ns)
     rows = [np.asarray(column).reshape(count, -1) for column in columns]
     for k in range(count):

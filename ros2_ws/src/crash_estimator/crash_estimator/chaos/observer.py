@@ -6,7 +6,7 @@ from functools import partial
 
 import rclpy
 from crash_msgs.msg import Attendance as AttendanceMessage
-from crash_msgs.msg import Parameters, Ranking, ReplayState
+from crash_msgs.msg import ParametersBlock, Ranking, ReplayState
 from crash_msgs.srv import GetEstimates
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -43,7 +43,8 @@ class Observer:
         self.final: dict[int, str] = {}  # what the diagnosis has said at the end, by revision
         node = self.node
         for name in estimators:
-            node.create_subscription(Parameters, f"{name}/parameters", partial(self._on_parameters, name), EVERY_SAMPLE)
+            hear = partial(self._on_parameters, name)
+            node.create_subscription(ParametersBlock, f"{name}/block/parameters", hear, EVERY_SAMPLE)
         self._clients = {name: node.create_client(GetEstimates, f"{name}/get_estimates") for name in estimators}
         self._asked: dict[str, tuple[Future, float]] = {}  # the newest call, and when another may be made
         node.create_subscription(Ranking, f"{diagnosis}/ranking", self._on_ranking, SAID)
@@ -98,7 +99,7 @@ class Observer:
             self._on_parameters(name, call.result().parameters)
         self._asked[name] = call, time.monotonic() + (0.0 if answered else PAUSE)
 
-    def _on_parameters(self, name: str, message: Parameters) -> None:
+    def _on_parameters(self, name: str, message: ParametersBlock) -> None:
         for number, digest in estimates_in(message):
             if self.estimates[name].setdefault(number, digest) != digest:
                 self.contradictions[name].add(number)

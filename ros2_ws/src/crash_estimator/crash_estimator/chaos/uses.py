@@ -158,9 +158,13 @@ class Launch:
         """Raises Broken."""
         recording = in_file(LAUNCH, self.recording)
         made = {}
-        for name, said in heard(self.observer).items():  # who is gone gives the judge nothing once more; what he said is
-            topic = f"/{name}/parameters "  # in the recording
-            written = {key.removeprefix(topic): said for key, said in recording.content.items() if key.startswith(topic)}
+        for name, said in heard(
+            self.observer
+        ).items():  # who is gone gives the judge nothing once more; what he said is
+            topic = f"/{name}/block/parameters "  # in the recording
+            written = {
+                key.removeprefix(topic): said for key, said in recording.content.items() if key.startswith(topic)
+            }
             made[f"estimates of {name}"] = Product(LAUNCH, written | said)
         made["diagnosis"] = Product(LAUNCH, answers(self.observer))
         return made | {"recording": recording}

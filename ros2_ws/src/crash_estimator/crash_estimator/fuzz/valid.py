@@ -11,11 +11,12 @@ from crash_msgs.msg import (
     Forces,
     Misfit,
     MisfitWindow,
-    Parameters,
+    ParametersBlock,
     RankedEffect,
     Ranking,
     ReplayState,
-    Residuals,
+    ResidualsBlock,
+    Revision,
 )
 from mcap.reader import make_reader
 from rclpy.serialization import serialize_message
@@ -174,8 +175,10 @@ TEST_INFO, SAMPLES = test_to_msg(RECORDING), samples_to_msg(RECORDING, 3, 9, 1, 
 BLOCK = {"run": 1, "number": 3, "time_ns": array("q", [1, 2]), "model": "m", "method": "mrls"}
 FOUR = array("d", [1.0, 2.0, 3.0, 4.0])
 OUTPUT = {
-    "parameters": Parameters(**BLOCK, name=["a", "b"], unit=["N", "N"], value=FOUR, std=FOUR, status=[0, 1, 2, 3]),
-    "residuals": Residuals(
+    "block/parameters": ParametersBlock(
+        **BLOCK, name=["a", "b"], unit=["N", "N"], value=FOUR, std=FOUR, status=[0, 1, 2, 3]
+    ),
+    "block/residuals": ResidualsBlock(
         **BLOCK, name=["a", "b"], unit=["N", "N"], measured=FOUR, predicted=FOUR, innovation=FOUR,
         innovation_std=FOUR, residual=FOUR, residual_std=FOUR,
     ),
@@ -186,8 +189,10 @@ OUTPUT = {
     "events": Event(run=1, number=3, time=0.01, kind="loading", target="e", value=1.0, text="a line"),
     "diagnosis/ranking": Ranking(run=1, number=3, ranking=[RankedEffect(effect="x", target="e")], found=["x on e"]),
     "diagnosis/misfit": Misfit(run=1, number=3, windows=[MisfitWindow(start=0.1, end=0.2, body="a")]),
-    "diagnosis/revisions": Residuals(**BLOCK, name=["a"], unit=["N"], measured=FOUR[:2], predicted=FOUR[:2],
-                                     residual=FOUR[:2], residual_std=FOUR[:2]),
+    "diagnosis/revisions": Revision(
+        run=1, number=3, time_ns=array("q", [1, 2]), model="m + x on e", revision=1, effects=["x on e"], final=True,
+        name=["a"], unit=["N"], measured=FOUR[:2], predicted=FOUR[:2], residual=FOUR[:2], noise_std=FOUR[:2],
+    ),
     "replay_state": ReplayState(run=1, number=4, total=60),
 }  # fmt: skip
 """What estimators, diagnosis and replay publish, by topic."""

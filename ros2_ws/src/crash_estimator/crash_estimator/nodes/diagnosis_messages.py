@@ -6,16 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from crash_msgs.msg import Misfit, MisfitWindow, RankedEffect, Ranking, Residuals
+from crash_msgs.msg import Misfit, MisfitWindow, RankedEffect, Ranking, Revision
 from std_msgs.msg import Header
 
 from ..core.diagnosis import FitCurves, OnlineAnswer, Ranked
 from ..core.structure import EffectSpec, Structure
-
-FINAL = "structured_fit"
-"""Method of the curves after the last sample."""
-SO_FAR = "structured_fit so far"
-"""Method of those said while samples come: of each stretch of samples, as the answer stood then."""
 
 
 class Moment(NamedTuple):
@@ -66,28 +61,24 @@ def misfit_message(at: Moment, answer: OnlineAnswer) -> Misfit:
     return Misfit(header=Header(stamp=at.stamp), run=at.run, number=at.number, model=at.structure.name, windows=windows)
 
 
-def revision_message(at: Moment, model: str, number: int, stamp: Time, fit: FitCurves, rows: slice) -> Residuals:
-    """The rows of a revision's curves; model: its name; number and stamp: of their first sample.
-
-    `predicted` is the structured fit's output, `residual_std` the sensors' noise; there is no innovation.
-    """
+def revision_message(at: Moment, model: str, number: int, stamp: Time, fit: FitCurves, rows: slice) -> Revision:
+    """The rows of a revision's curves; model: its name; number and stamp: of their first sample."""
     measured, predicted = fit.measured[rows], fit.predicted[rows]
-    nothing = np.full_like(measured, np.nan)
     tables = {
         "measured": measured,
         "predicted": predicted,
         "residual": measured - predicted,
-        "residual_std": np.broadcast_to(fit.noise, measured.shape),
-        "innovation": nothing,
-        "innovation_std": nothing,
+        "noise_std": np.broadcast_to(fit.noise, measured.shape),
     }
-    return Residuals(
+    return Revision(
         header=Header(stamp=stamp),
         run=at.run,
         number=number,
         time_ns=array("q", fit.time_ns[rows].tobytes()),
         model=model,
-        method=FINAL if at.final else SO_FAR,
+        revision=at.revision,
+        effects=names(fit.effects),
+        final=at.final,
         name=list(fit.names),
         unit=list(fit.units),
         **{name: array("d", table.tobytes()) for name, table in tables.items()},

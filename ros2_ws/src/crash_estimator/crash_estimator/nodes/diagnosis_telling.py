@@ -1,7 +1,7 @@
 """What a diagnosis publishes of its answers, and logs of the final ones."""
 
 import numpy as np
-from crash_msgs.msg import Misfit, Ranking, Residuals
+from crash_msgs.msg import Misfit, Ranking, Revision
 from rclpy.node import Node
 
 from crash_replay.qos import SAID
@@ -20,7 +20,7 @@ class Telling:
         self.node, self.given = node, given
         self.ranking_out = node.create_publisher(Ranking, "~/ranking", SAID)
         self.misfit_out = node.create_publisher(Misfit, "~/misfit", SAID)
-        self.revisions_out = node.create_publisher(Residuals, "~/revisions", SAID)
+        self.revisions_out = node.create_publisher(Revision, "~/revisions", SAID)
         self.told: dict[int, Told] = {}  # final answers by revision
         self.drawn = 0  # number of the first sample that no curve has been published of in this pass
         self.last = ""  # what was told last in this pass

@@ -6,7 +6,7 @@ from functools import lru_cache, partial
 from typing import TypeVar
 
 import numpy as np
-from crash_msgs.msg import Event, Forces, Parameters, Residuals
+from crash_msgs.msg import Event, Forces, ParametersBlock, ResidualsBlock
 
 from crash_replay.cdr import Serialized
 from crash_replay.ros_messages import stamp
@@ -14,7 +14,7 @@ from crash_replay.ros_messages import stamp
 from ..core.estimate import Description, Estimate, ParameterStatus
 from ..following.columns import Columns
 
-Message = TypeVar("Message", Parameters, Residuals, Forces)
+Message = TypeVar("Message", ParametersBlock, ResidualsBlock, Forces)
 SIZES = 8
 """Lengths of blocks whose messages are kept to be filled again: a replay sends one, and what is left at the end."""
 
@@ -26,8 +26,8 @@ class EstimateMessages:
         d = description
         ends = ["-".join(pair) for pair in d.between]
         empty = (
-            Parameters(name=[*d.parameters, *d.extra], unit=[*d.parameter_units, *d.extra_units]),
-            Residuals(name=list(d.equations), unit=list(d.equation_units)),
+            ParametersBlock(name=[*d.parameters, *d.extra], unit=[*d.parameter_units, *d.extra_units]),
+            ResidualsBlock(name=list(d.equations), unit=list(d.equation_units)),
             Forces(element=list(d.elements), between=ends, body=list(d.bodies), mass=array("d", d.masses)),
         )
         for message in empty:
@@ -80,7 +80,7 @@ class Tables:
         return bytes(self.message)
 
 
-def description_from(parameters: Parameters, residuals: Residuals, forces: Forces) -> Description:
+def description_from(parameters: ParametersBlock, residuals: ResidualsBlock, forces: Forces) -> Description:
     """Names and units from one message of each kind."""
     bodies, count = tuple(forces.body), _parameters(parameters.status, len(parameters.name))
     return Description(
@@ -100,7 +100,7 @@ def description_from(parameters: Parameters, residuals: Residuals, forces: Force
 
 
 def estimates_from(
-    parameters: Sequence[Parameters], residuals: Sequence[Residuals], forces: Sequence[Forces]
+    parameters: Sequence[ParametersBlock], residuals: Sequence[ResidualsBlock], forces: Sequence[Forces]
 ) -> list[Estimate]:
     """The samples that all three kinds of message tell of, in order, without events.
 
@@ -133,18 +133,18 @@ def estimates_from(
 
 
 FIELDS = {
-    Parameters: ("value", "std", "status"),
-    Residuals: ("measured", "predicted", "innovation", "innovation_std", "residual", "residual_std"),
+    ParametersBlock: ("value", "std", "status"),
+    ResidualsBlock: ("measured", "predicted", "innovation", "innovation_std", "residual", "residual_std"),
     Forces: ("crush", "rate", "force", "force_std", "state", "displacement", "velocity", "acceleration"),
 }
 """Those with one row a sample."""
-NAMES = {Parameters: ("name", "name"), Residuals: ("name", "name"), Forces: ("element", "body")}
+NAMES = {ParametersBlock: ("name", "name"), ResidualsBlock: ("name", "name"), Forces: ("element", "body")}
 """What a row has values of: most fields, those in OF_BODIES."""
 OF_BODIES = ("displacement", "velocity", "acceleration")
 BYTES = ("status", "state")
 
 
-def _samples(message: Parameters | Residuals | Forces) -> Iterator[tuple[int, dict]]:
+def _samples(message: ParametersBlock | ResidualsBlock | Forces) -> Iterator[tuple[int, dict]]:
     """(number, fields) of each sample of a block."""
     n = len(message.time_ns)
     tables = {field: np.asarray(getattr(message, field)).reshape(n, -1) for field in FIELDS[type(message)]}

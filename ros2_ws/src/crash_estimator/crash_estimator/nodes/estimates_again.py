@@ -1,6 +1,6 @@
 """The service `~/get_estimates`: what an estimator has said of some samples once more, for a node that missed it."""
 
-from crash_msgs.msg import Forces, Parameters, Residuals
+from crash_msgs.msg import Forces, ParametersBlock, ResidualsBlock
 from crash_msgs.srv import GetEstimates
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
@@ -44,7 +44,7 @@ class EstimatesAgain:
             return response
         at = self.time_zero + int(columns.time_ns[0]), request.run, columns
         response.success = True
-        response.parameters = deserialize_message(messages.parameters(*at), Parameters)
-        response.residuals = deserialize_message(messages.residuals(*at), Residuals)
+        response.parameters = deserialize_message(messages.parameters(*at), ParametersBlock)
+        response.residuals = deserialize_message(messages.residuals(*at), ResidualsBlock)
         response.forces = deserialize_message(messages.forces(*at), Forces)
         return response

@@ -1,7 +1,8 @@
 """`estimator`: follows the replayed samples with one model and one method, and publishes what it finds.
 
 Subscribes to `test` and `samples`, or to `channels/<name>` where rosbag2's player plays the bag; publishes
-`~/parameters`, `~/residuals`, `~/forces`, `~/events` and `~/state`, and answers on `answers` what it has done with.
+`~/parameters` and `~/residuals` by name, the same in blocks on `~/block/parameters` and `~/block/residuals`,
+`~/forces`, `~/events` and `~/state`, and answers on `answers` what it has done with.
 Several run side by side under different names (`--ros-args -r __node:=mrls`).
 """
 
@@ -18,7 +19,7 @@ from crash_replay.attending import Attending, Progress
 from crash_replay.complaints import Complaints
 from crash_replay.health import HealthReport
 from crash_replay.limits import most_samples
-from crash_replay.node_parameters import NAME, Allowed, declare_parameters
+from crash_replay.node_parameters import NAME, Allowed, declare_parameters, names_in
 from crash_replay.qos import EVERY_SAMPLE, LATCHED, UNLATCHED
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import stamp_ns, test_from_msg
@@ -50,6 +51,7 @@ PARAMETERS = {
     "settings": Allowed([""], "settings of the method, such as forgetting=0.98"),
     "effects": Allowed("", "your own effects, a .py file; it is executed"),
     "effective_mass": Allowed(False, "find the masses that go with the accelerometers first"),
+    "value_topics": Allowed([""], "parameters that get a topic of their own, names or patterns such as *.stiffness"),
     "replay": Allowed("replay", "node that samples are asked of which were missed", pattern=NAME),
 }
 
@@ -59,7 +61,7 @@ class EstimatorNode(Node):
         """options: of rclpy's Node, such as parameter_overrides. Raises ModelError or ParameterError with one line."""
         super().__init__("estimator", automatically_declare_parameters_from_overrides=True, **options)
         asked = declare_parameters(self, PARAMETERS)
-        replay = asked.pop("replay")
+        replay, value_topics = asked.pop("replay"), names_in(asked.pop("value_topics"))
         with compiling_said(self.get_logger().info):
             self.model = EstimatorModel(**asked)
         self.test_message: TestInfo | None = None
@@ -70,7 +72,7 @@ class EstimatorNode(Node):
         self.at_fault = ""  # why nothing is estimated on this test
         self.complaints = Complaints(lambda line: self.get_logger().error(line))
         self.warnings = Complaints(lambda line: self.get_logger().warning(line))
-        self.topics = EstimatorTopics(self)
+        self.topics = EstimatorTopics(self, value_topics)
         self.again = EstimatesAgain(self)
         self.attending = Attending(self, "estimator", self._progress)
         self.intake = Intake(self, f"{replay}/get_samples", self.attending, self)

@@ -1,10 +1,11 @@
 """What `estimator` publishes."""
 
 import time
+from collections.abc import Sequence
 from functools import partial
 
 from builtin_interfaces.msg import Time
-from crash_msgs.msg import Answer, EstimatorState, Event, Forces, Parameters, Residuals
+from crash_msgs.msg import Answer, EstimatorState, Event, Forces, ParametersBlock, ResidualsBlock
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
@@ -19,18 +20,21 @@ from ..following.columns import Columns
 from .estimate_messages import FIELDS, EstimateMessages
 from .estimator_model import EstimatorModel
 from .later import LOOK, Later
+from .named_estimates import NamedTopics
 
 
 class EstimatorTopics:
-    def __init__(self, node: Node):
-        self.parameters = node.create_publisher(Parameters, "~/parameters", STREAM)
-        self.residuals = node.create_publisher(Residuals, "~/residuals", STREAM)
+    def __init__(self, node: Node, value_topics: Sequence[str] = ()):
+        """value_topics: parameters that get a topic of their own, names or patterns."""
+        self.parameters = node.create_publisher(ParametersBlock, "~/block/parameters", STREAM)
+        self.residuals = node.create_publisher(ResidualsBlock, "~/block/residuals", STREAM)
+        self.named = NamedTopics(node, value_topics)
         self.forces = node.create_publisher(Forces, "~/forces", STREAM)
         self.events = node.create_publisher(Event, "~/events", STREAM)
         self.state = node.create_publisher(EstimatorState, "~/state", LATCHED)
         self.answers = node.create_publisher(Answer, "answers", LATCHED)  # a replay that finds it late gets the last
         self.answered = Serialized(Answer(node=node.get_fully_qualified_name()))
-        streams = (self.parameters, self.residuals, self.forces)
+        streams = (self.parameters, self.residuals, self.forces, *self.named.streams)
         self.flow = Flow(lambda: streams, node.get_logger().warning, partial(waited_for, node, streams))
         self.later = Later(self.forces.publish, lambda: self.forces.wait_for_all_acked(NOT_WAITING))
         self.looking = node.create_timer(LOOK, self._look_later, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -41,18 +45,28 @@ class EstimatorTopics:
     def begin(self, description: Description, revision: int, time_zero: Time) -> None:
         """What follows comes from this model on this test."""
         self.messages, self.time_zero = EstimateMessages(description, revision), stamp_ns(time_zero)
+        self.named.begin(description, revision)
 
     def estimates(self, run: int, columns: Columns, stamp_ns: int) -> None:
         """stamp_ns: of the first of the samples. Waits while those who keep all have not taken what was said before."""
-        while not self.flow.has_room(time.perf_counter(), on_time=True):
-            time.sleep(0.0005)
+        self._wait_for_room()
         self.parameters.publish(self.messages.parameters(stamp_ns, run, columns))
         self.residuals.publish(self.messages.residuals(stamp_ns, run, columns))
         if self.forces.get_subscription_count():
             self._tell_forces(run, columns, stamp_ns)
         self.flow.sent(1, 0)
+        self.named.publish(run, columns, stamp_ns, self._sent_named)
         for event in self.messages.events(stamp_ns, run, columns):
             self.events.publish(event)
+
+    def _wait_for_room(self) -> None:
+        while not self.flow.has_room(time.perf_counter(), on_time=True):
+            time.sleep(0.0005)
+
+    def _sent_named(self, size: int) -> None:
+        """Of a block there may be more of them than a publisher keeps."""
+        self.flow.sent(1, size)
+        self._wait_for_room()
 
     def _tell_forces(self, run: int, columns: Columns, stamp_ns: int) -> None:
         """They are for who looks on, and nearly half of all that is said: in a rush the estimates go first.

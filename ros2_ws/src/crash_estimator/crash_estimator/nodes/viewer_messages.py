@@ -1,14 +1,23 @@
 """crash_msgs -> the viewer's blocks: the one file of the viewer that knows both worlds."""
 
 import numpy as np
-from crash_msgs.msg import Event, Forces, Misfit, Parameters, RankedEffect, Ranking, Residuals, TestInfo
+from crash_msgs.msg import (
+    Event,
+    Forces,
+    Misfit,
+    ParametersBlock,
+    RankedEffect,
+    Ranking,
+    ResidualsBlock,
+    Revision,
+    TestInfo,
+)
 
 from crash_replay.foreign_text import visible
 from crash_replay.recording import RecordingError
 
 from ..viewer.blocks import EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock
 from ..viewer.findings import Candidate, MisfitBlock, RankingBlock, RevisionBlock, Window
-from .diagnosis_messages import FINAL
 
 
 def test_block(message: TestInfo) -> TestBlock:
@@ -16,7 +25,7 @@ def test_block(message: TestInfo) -> TestBlock:
     return TestBlock(*about, int(message.samples), float(message.sample_period))
 
 
-def parameter_block(estimator: str, message: Parameters) -> ParameterBlock:
+def parameter_block(estimator: str, message: ParametersBlock) -> ParameterBlock:
     names = tuple(message.name)
     return ParameterBlock(
         *_head(estimator, message),
@@ -26,7 +35,7 @@ def parameter_block(estimator: str, message: Parameters) -> ParameterBlock:
     )
 
 
-def residual_block(estimator: str, message: Residuals) -> ResidualBlock:
+def residual_block(estimator: str, message: ResidualsBlock) -> ResidualBlock:
     names = tuple(message.name)
     fields = ("measured", "predicted", "innovation", "innovation_std", "residual", "residual_std")
     return ResidualBlock(*_head(estimator, message), names, tuple(message.unit), **_tables(message, len(names), fields))
@@ -50,8 +59,8 @@ def event_block(estimator: str, message: Event) -> EventBlock:
 
 
 BLOCK_OF = {
-    "parameters": (Parameters, parameter_block),
-    "residuals": (Residuals, residual_block),
+    "block/parameters": (ParametersBlock, parameter_block),
+    "block/residuals": (ResidualsBlock, residual_block),
     "forces": (Forces, force_block),
     "events": (Event, event_block),
 }
@@ -94,33 +103,36 @@ def misfit_block(message: Misfit) -> MisfitBlock:
     return MisfitBlock(message.run, message.number, tuple(windows))
 
 
-def revision_block(message: Residuals) -> RevisionBlock:
+def revision_block(message: Revision) -> RevisionBlock:
     return RevisionBlock(
         message.run,
         message.number,
         np.asarray(message.time_ns, dtype=np.int64),
         message.model,
-        message.method == FINAL,
+        message.final,
         tuple(message.name),
         tuple(message.unit),
-        **_tables(message, len(message.name), ("measured", "predicted", "residual", "residual_std")),
+        **_tables(message, len(message.name), ("measured", "predicted", "residual")),
+        residual_std=_tables(message, len(message.name), ("noise_std",))["noise_std"],
     )
 
 
 FINDING_OF = {
     "diagnosis/ranking": (Ranking, ranking_block),
     "diagnosis/misfit": (Misfit, misfit_block),
-    "diagnosis/revisions": (Residuals, revision_block),
+    "diagnosis/revisions": (Revision, revision_block),
 }
 """A topic of the diagnosis -> its message type and what makes a finding of it."""
 
 
-def _head(estimator: str, message: Parameters | Residuals | Forces) -> tuple:
+def _head(estimator: str, message: ParametersBlock | ResidualsBlock | Forces) -> tuple:
     time_ns = np.asarray(message.time_ns, dtype=np.int64)
     return estimator, message.run, message.number, time_ns, message.model, message.method
 
 
-def _tables(message: Parameters | Residuals | Forces, width: int, fields: tuple[str, ...]) -> dict[str, np.ndarray]:
+def _tables(
+    message: ParametersBlock | ResidualsBlock | Forces | Revision, width: int, fields: tuple[str, ...]
+) -> dict[str, np.ndarray]:
     """Fields of n x width values, sent row by row. Raises RecordingError where a length does not fit."""
     n = len(message.time_ns)
     for name in fields:

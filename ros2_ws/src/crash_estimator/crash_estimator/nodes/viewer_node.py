@@ -1,9 +1,9 @@
 """`viewer`: shows what the estimators say in Rerun, live, and writes it to a .rrd file.
 
-Subscribes to `test`, each estimator's `parameters`, `residuals`, `forces` and `events`, and the diagnosis' `ranking`,
-`misfit` and `revisions`. Callbacks only queue what comes; decoding, drawing and waiting for a slow screen happen in the
-recorder's own thread. What it has missed itself it asks the estimators for; what it lacks in the end it says on the
-terminal, in the file and by its exit status.
+Subscribes to `test`, each estimator's `block/parameters`, `block/residuals`, `forces` and `events`, and the diagnosis'
+`ranking`, `misfit` and `revisions`. Callbacks only queue what comes; decoding, drawing and waiting for a slow screen
+happen in the recorder's own thread. What it has missed itself it asks the estimators for; what it lacks in the end it
+says on the terminal, in the file and by its exit status.
 """
 
 import os
@@ -164,9 +164,9 @@ class ViewerNode(Node):
 
     def _estimators_around(self) -> set[str]:
         own = self.get_namespace().rstrip("/") + "/"
-        kind = "crash_msgs/msg/Residuals"
+        kind, last = "crash_msgs/msg/ResidualsBlock", "/block/residuals"
         topics = [topic for topic, kinds in self.get_topic_names_and_types() if kind in kinds]
-        return {topic.removeprefix(own).removesuffix("/residuals") for topic in topics if topic.endswith("/residuals")}
+        return {topic.removeprefix(own).removesuffix(last) for topic in topics if topic.endswith(last)}
 
     def _be_counted(self) -> None:
         """Subscribe to `samples` once all estimators can be heard, until the first sample.

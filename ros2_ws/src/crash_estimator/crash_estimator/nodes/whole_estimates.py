@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-from crash_msgs.msg import EstimatorState, Forces, Parameters, Residuals
+from crash_msgs.msg import EstimatorState, Forces, ParametersBlock, ResidualsBlock
 from crash_msgs.srv import GetEstimates
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -22,7 +22,7 @@ from crash_replay.qos import LATCHED, STREAM
 
 from ..following.in_order import About, InOrder
 
-TOPICS = {"parameters": Parameters, "residuals": Residuals, "forces": Forces}
+TOPICS = {"block/parameters": ParametersBlock, "block/residuals": ResidualsBlock, "forces": Forces}
 """What is said of every sample."""
 
 LOOK = 0.1
@@ -48,7 +48,7 @@ class WholeEstimates:
             node.create_subscription(kind, f"{name}/{topic}", partial(self._on_said, topic), STREAM, raw=True)
             for topic, kind in TOPICS.items()
         ]
-        self.name = self.inputs[0].topic_name.rpartition("/")[0]
+        self.name = self.inputs[0].topic_name.removesuffix("/block/parameters")
         self.states: list[EstimatorState] = []  # from which sample on the estimates come from which model
         node.create_subscription(EstimatorState, f"{name}/state", self._on_state, LATCHED)
         self.client = node.create_client(GetEstimates, f"{name}/get_estimates")
@@ -190,7 +190,8 @@ class WholeEstimates:
     def _fill(self, response: GetEstimates.Response, run: int, start: int) -> None:
         self.since, self.most = 0.0, 1 << 20
         for stream in self._lacking(run, start):
-            message = getattr(response, next(topic for topic, one in self.streams.items() if one is stream))
+            topic = next(topic for topic, one in self.streams.items() if one is stream)
+            message = getattr(response, topic.rpartition("/")[2])
             about = About(message.run, message.number, len(message.time_ns))
             if (about.run, about.number) != (run, start) or not about.count:
                 return self._give_up(run, start, start + 1, f"{self.client.srv_name} gave something else")

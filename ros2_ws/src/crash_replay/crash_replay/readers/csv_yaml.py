@@ -1,7 +1,7 @@
 """CSV with a YAML of the same name beside it.
 
     rib.csv:   time,rib_ay,...         s, then one column for each channel
-    rib.yaml:  test: {id: T1, title: "...", source: "..."}
+    rib.yaml:  test: {id: T1, title: "...", source: "...", date: 2019-05-04}
                channels: {rib_ay: {quantity: acceleration, unit: g, body: rib, axis: y, sign: 1}}
                initial_velocity: {rib: 0.0}          m/s at time zero and before it
                initial_displacement: {rib: -0.02}    m at time zero
@@ -22,6 +22,7 @@ from pydantic import Field
 from .. import limits
 from ..recording import SI_UNIT, Channel, Recording, RecordingError, Test
 from ..yaml_schema import load_yaml, suggestion
+from .dates import checked_stamp
 from .description import ChannelNames, Displacements, Part, TestPart, Velocities, unknown_bodies
 from .units import si_factor
 
@@ -81,6 +82,7 @@ def read(path: Path) -> Recording:
             initial_velocity=description.initial_velocity,
             initial_displacement=description.initial_displacement,
             notes=tuple(notes),
+            impact_ns=checked_stamp(description.test.date, "test.date"),
         )
         return Recording(test, np.rint(table[:, 0] * 1e9).astype(np.int64), np.stack(values, axis=1))
     except RecordingError as error:  # two channels of one name, for instance

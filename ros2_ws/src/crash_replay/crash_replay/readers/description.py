@@ -4,15 +4,16 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from ..limits import DISPLACEMENT, VELOCITY
 from ..recording import Channel, Recording, RecordingError, Test
 from ..shortened import shortened
 from ..yaml_schema import Text, load_yaml, number, suggestion
+from .dates import checked_stamp
 
 Axis = Literal["x", "y", "z", ""]
 Velocities = dict[Text, number(VELOCITY)]
@@ -29,6 +30,7 @@ class TestPart(Part):
     id: str | None = Field(None, coerce_numbers_to_str=True)
     title: str = ""
     source: str = ""
+    date: Annotated[str, BeforeValidator(str)] = ""  # and time, UTC; YAML reads most dates as what they are
 
     __test__ = False  # not a pytest class
 
@@ -80,6 +82,7 @@ def apply_names(recording: Recording, path: Path) -> Recording:
         id=names.test.id or test.id,
         title=names.test.title or test.title,
         source=names.test.source or test.source,
+        impact_ns=checked_stamp(names.test.date, f"{path}: test.date") or test.impact_ns,
         channels=channels,
         initial_velocity=inherited | names.initial_velocity,
         initial_displacement=dict(test.initial_displacement) | names.initial_displacement,

@@ -20,6 +20,7 @@ from ..recording import Channel, Recording, RecordingError, Test
 from ..shortened import shortened
 from ..unique_names import unique
 from .body_means import Sensor, body_motion
+from .dates import stamp_of
 from .isomme_codes import channel_of, is_time
 from .units import si_factor
 
@@ -113,6 +114,7 @@ def read(path: Path, all_sensors: bool = False) -> Recording:
             source=", ".join(filter(None, source)),
             initial_velocity=velocity,
             notes=tuple(notes),
+            impact_ns=stamp_of(header.get("date of the test") or ""),
         )
         return Recording(test, time_ns, np.stack(list(columns.values()), axis=1))
     except RecordingError as error:

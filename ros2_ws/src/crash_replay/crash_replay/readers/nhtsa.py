@@ -18,6 +18,7 @@ from ..progress import with_progress
 from ..recording import Channel, Recording, RecordingError, Test
 from ..shortened import shortened
 from .body_means import BodyMotion, Sensor, body_motion
+from .dates import stamp_of
 from .ev5 import Curve, Header, read_header
 from .ev5_codes import location_of
 from .left_out import summary
@@ -104,6 +105,7 @@ def read(path: Path, cells: bool = False, all_sensors: bool = False) -> Recordin
             source=f"NHTSA Vehicle Crash Test Database, test {header.number}: {header.laboratory}, {header.date}",
             initial_velocity=_initial_velocity(tracks),
             notes=tuple(notes),
+            impact_ns=stamp_of(header.date),
         )
         return Recording(test, time_ns, np.stack(list(columns.values()), axis=1))
     except RecordingError as error:

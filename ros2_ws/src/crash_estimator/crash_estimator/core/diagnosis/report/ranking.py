@@ -32,7 +32,7 @@ class Ranked:
     unit: str
     evidence: float  # nats gained over the model without it
     explained: float  # share of the residual's variance that it removes
-    identifiable: bool
+    identifiable: bool  # nothing else explains as much, and the standard deviation is below the coefficient
     confounded_with: tuple[str, ...]  # "effect on target"
     shape: dict[str, float] = field(default_factory=dict)  # shape constants found
     fitted: bool = True  # False: screened only; its evidence is an estimate
@@ -117,8 +117,9 @@ def _ranked(one: CandidateFit, before: Model, shown: list[CandidateFit]) -> Rank
         left = analyse(one.fit).mean_square
         explained = float(np.clip(1.0 - left / before.residuals.mean_square, 0.0, 1.0))
         value, std, shape = stated(one.fit.layout.term(addition), one.fit)
+    identifiable = not rivals and bool(std <= abs(value))  # whose sigma exceeds it may as well be nothing
     return Ranked(
-        effect, target, value, std, addition.effect.unit, float(one.gain), explained, not rivals, rivals, shape,
+        effect, target, value, std, addition.effect.unit, float(one.gain), explained, identifiable, rivals, shape,
         one.fit is not None,
     )  # fmt: skip
 
