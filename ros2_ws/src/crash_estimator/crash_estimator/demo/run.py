@@ -22,6 +22,9 @@ STANDING_STILL = 400.0
 """For the next sample or estimate; longer than a replay waits for listeners of which we know nothing."""
 ANSWERING = 1800.0
 """For the diagnosis, which works and says so, to judge all samples, and again with what it has added."""
+TAKING_IN = 150.0
+"""For the diagnosis to take in its next sample after the replay's end: who has been stopped goes on within that, and
+what has not reached it nobody sends again."""
 LATE = 10.0
 """For an answer that the diagnosis says it has given."""
 ESTIMATING = 120.0
@@ -122,7 +125,15 @@ class Run:
         def progress() -> Hashable:
             return len(story.finals)
 
+        def taken_in() -> int:
+            word = company.word("diagnosis")
+            return word.next if word else 0
+
         gone = lambda: not (company.there("diagnosis") and watch.finished)  # noqa: E731
+        has_all = lambda: done() or gone() or taken_in() >= watch.total  # noqa: E731
+        if not self._wait(has_all, tell, TAKING_IN, taken_in):
+            why = f"it has {taken_in()} of {watch.total} samples, and the replay has ended"
+            return self.incomplete.append(f"no answer of the diagnosis ({why})")
         in_time = self._wait(lambda: done() or gone(), tell, ANSWERING, progress)
         if done():
             self._wait(lambda: story.complete or gone(), tell, LATE, progress)
