@@ -31,6 +31,8 @@ ESTIMATING = 120.0
 """For the estimators to estimate all samples again with what was added."""
 DRAWING = 600.0
 """For the viewer to draw what waits."""
+DRAWING_THE_REST = 30.0
+"""Where something is missing already."""
 CLOSING = 90.0
 """For the viewer to finish its file."""
 
@@ -188,8 +190,9 @@ class Run:
             return not company.there("viewer") or (word is not None and word.done)
 
         waiting = self.terminal.waiting_for(f"writing {near(self.rrd)}")
-        over = not self.watch.finished  # it would wait for the rest of the test; told to end, it draws what it has
-        if not over and not self._wait(drawn, waiting, DRAWING, lambda: None):
+        # Where something is missing it may wait for that in vain; told to end, it draws what it has.
+        patience = DRAWING if not self.incomplete else DRAWING_THE_REST if self.watch.finished else 0.0
+        if not self._wait(drawn, waiting, patience, lambda: None) and not self.incomplete:
             self.incomplete.append(f"the viewer has not drawn all within {DRAWING:g} s")
         company.let_go.add("viewer")
         if viewer.status is None and "viewer" not in company.lost:
