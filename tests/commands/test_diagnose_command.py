@@ -58,7 +58,8 @@ def test_it_says_what_is_missing_and_where_the_model_fails(monkeypatch, capsys, 
     assert (first["effect"], first["target"], first["unit"]) == ("viscous_damping", "padding", "N*s/m")
     assert abs(first["coefficient"] - damper()) < 4.0 * first["std"]
     assert 0.5 < first["explained"] <= 1.0 and first["identifiable"] and first["confounded_with"] == []
-    unsure = [one for one in found["ranking"] if not one["std"] <= abs(one["coefficient"])]
+    std_of = lambda one: float("inf") if one["std"] is None else one["std"]  # noqa: E731
+    unsure = [one for one in found["ranking"] if not std_of(one) <= abs(one["coefficient"])]
     assert not any(one["identifiable"] for one in unsure), "whose sigma exceeds it may as well be nothing"
     evidence = [one["evidence"] for one in found["ranking"]]
     assert evidence == sorted(evidence, reverse=True)
