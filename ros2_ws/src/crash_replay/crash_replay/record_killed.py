@@ -73,7 +73,7 @@ class Source:
     def _publish(self) -> None:
         began = time.perf_counter()
         while not self.stop.wait(0.002):
-            while len(self.stamps) < (time.perf_counter() - began) * RATE:
+            while not self.stop.is_set() and len(self.stamps) < (time.perf_counter() - began) * RATE:
                 now, number = time.time_ns(), len(self.stamps)
                 for name, publisher in self.publishers.items():
                     message = self.messages[name]
