@@ -28,9 +28,9 @@ def test_the_first_two_commands_do_everything():
 def test_a_command_runs_as_it_stands(command):
     needs_data(command)
     if "out/camry.mcap --model" in command and not (ROOT / "out/camry.mcap").exists():  # by the command before it
-        subprocess.run(
-            shlex.split(ALONE[ALONE.index(command) - 1]), cwd=ROOT, check=True, capture_output=True, env=environment()
-        )
+        before = ALONE[ALONE.index(command) - 1]
+        needs_data(before)
+        subprocess.run(shlex.split(before), cwd=ROOT, check=True, capture_output=True, env=environment())
     if "synthesize" in command:  # does not replace what is there
         (ROOT / "out" / "mine.mcap").unlink(missing_ok=True)
     done = subprocess.run(
