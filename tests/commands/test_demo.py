@@ -168,9 +168,10 @@ def test_a_viewer_that_was_stopped_draws_all_the_same(demo, recording):  # noqa:
         assert counts[f"/signal/cab/model/{name}"] == len(recording)
 
 
-@pytest.mark.parametrize("killed", ["viewer", "mrls", "replay"])
-def test_who_dies_is_named_in_the_last_line_and_the_others_go_on(demo, killed):  # noqa: F811
-    show = demo(*([] if killed == "viewer" else ["--no-viewer"]), *PLAIN, "--rate", "0.05")
+@pytest.mark.parametrize("killed, shown", [("viewer", True), ("mrls", False), ("replay", False), ("replay", True)])
+def test_who_dies_is_named_in_the_last_line_and_the_others_go_on(demo, killed, shown):  # noqa: F811
+    """Soon: a viewer is not given the time to draw what a dead replay will not send."""
+    show = demo(*([] if shown else ["--no-viewer"]), *PLAIN, "--rate", "0.05")
     show.wait_for_samples()
     os.kill(show.child(f"__node:={killed}" if killed in ESTIMATORS else f"/{killed} "), signal.SIGKILL)
     assert show.end() == 1, show.said()

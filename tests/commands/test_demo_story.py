@@ -37,6 +37,13 @@ def test_adequate_ends_the_story_at_once():
     assert story.complete
 
 
+def test_where_nothing_explains_enough_the_best_is_told_as_such_and_nothing_is_waited_for():
+    story, block = Story(), ranking(0.09, 300.0, final=True)._replace(verdict="unexplained")
+    told = tell(story, block, misfit(0.06))
+    assert told[0].startswith("all samples: unexplained") and "does not explain it" in told[-1]
+    assert story.complete, "the diagnosis adds nothing then"
+
+
 def test_what_cannot_be_told_apart_is_said():
     rivals = ("a on b", "c on d", "e on f", "g on h")
     block = ranking(0.09, 300.0, final=True)._replace(ranking=(candidate(ADDED, 300.0, rivals),))

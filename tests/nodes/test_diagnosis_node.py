@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.core.diagnosis.report.diagnosis import Diagnosis, diagnose
 from crash_estimator.core.effects.change import add_effect
+from crash_estimator.nodes.diagnosis_node import DiagnosisNode
 from crash_estimator.nodes.effect_requests import request_of, with_effect
 from crash_replay.bag import time_zero_ns, write_bag
 from crash_replay.qos import STREAM
@@ -164,6 +166,19 @@ def test_the_first_effect_found_is_added_to_itself_and_to_the_estimators(stage, 
         assert_allclose(own.coefficient, offline_on_both.steps[0].coefficient, rtol=SAME)
     stage.spin(1.0)
     assert len(stage.finals("adder")) == 2, "it adds once"
+
+
+@pytest.mark.parametrize("verdict, added", [("effect_missing", 1), ("unexplained", 0)])
+def test_only_what_the_verdict_names_is_added(verdict, added):
+    """Where nothing explains enough the best is reported, and not added."""
+    taken: list = []
+    answer = SimpleNamespace(found=("an effect",), verdict=verdict)
+    node = SimpleNamespace(
+        finals={}, adds=True, kept=SimpleNamespace(missing=lambda end: 0), model=SimpleNamespace(add=taken.append)
+    )
+    for _ in range(2):
+        DiagnosisNode._add_found(node, SimpleNamespace(revision=0, number=9), answer)
+    assert len(taken) == added
 
 
 def test_an_effect_added_and_taken_out_makes_a_revision_each(stage, case, offline):

@@ -1,106 +1,26 @@
 """`record` as a process: when it ends, what it says, and what is in its file then."""
 
 import os
-import resource
 import signal
 import subprocess
 import sys
 import time
-from collections import Counter
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, Thread
 
 import pytest
 from crash_msgs.msg import Attendance as Word
-from crash_msgs.msg import ParametersBlock, Ranking, ResidualsBlock
-from crash_msgs.srv import GetEstimates, Step
-from helpers_replay import DOMAIN, Listener, Replay, environment, some_recording, wait_until
+from crash_msgs.msg import Ranking
+from crash_msgs.srv import Step
+from helpers_record import Estimator, Record, messages, says_of_itself
+from helpers_replay import Listener, Replay, environment, some_recording, wait_until
 from helpers_waiting import PATIENCE
-from mcap.reader import make_reader
 
-from crash_replay import record_killed
-from crash_replay.attending import Attending, Progress
 from crash_replay.bag import read_bag, write_bag
 from crash_replay.processes import this_host
-from crash_replay.qos import SAID, STREAM
+from crash_replay.qos import SAID
 from crash_replay.record_node import RecordError, opened
-
-
-def messages(file: Path) -> Counter:
-    with file.open("rb") as stream:
-        return Counter(channel.topic for _, channel, _ in make_reader(stream).iter_messages())
-
-
-def says_of_itself(file: Path) -> dict[str, str]:
-    with file.open("rb") as stream:
-        return next(r.metadata for r in make_reader(stream).iter_metadata() if r.name == "crash_replay")
-
-
-class Record:
-    """`record` with its output; killed with the test."""
-
-    def __init__(self, file: Path, limit: int | None = None, **parameters):
-        """limit: bytes that it may write into a file."""
-        command = [sys.executable, "-m", "crash_replay.record_node", "--ros-args", "-p", f"to:={file}"]
-        for name, value in parameters.items():
-            command += ["-p", f"{name}:={value}"]
-        limited = (lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))) if limit else None
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        self.process = subprocess.Popen(command, env=environment(), preexec_fn=limited, **pipes)
-
-    def end(self, number: int = 0, timeout: float = PATIENCE) -> tuple[int, str, str]:
-        """Its exit status, output and errors without what it logs."""
-        if number:
-            self.process.send_signal(number)
-        output, errors = self.process.communicate(timeout=timeout)
-        logged = [line for line in errors.splitlines() if not line.startswith("[") and "RTPS_" not in line]
-        return self.process.returncode, output.strip(), "\n".join(logged)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        if self.process.poll() is None:
-            self.process.kill()
-            self.process.communicate()
-
-
-class Estimator(Listener):
-    """Says something on every sample it hears, and takes part."""
-
-    def __init__(self, name: str = "fake", silent_from: int = 10**9):
-        """silent_from: number of the sample from which on nothing is published, though it can be had again."""
-        super().__init__(name)
-        self.next, self.silent_from = 0, silent_from
-        node = self.node
-        self.out = [node.create_publisher(kind, f"~/block/{topic}", STREAM) for kind, topic in self.kinds.items()]
-        node.create_service(GetEstimates, "~/get_estimates", self._again)
-        self.attending = Attending(node, "estimator", self._progress)
-        self.executor.wake()
-
-    kinds = {ParametersBlock: "parameters", ResidualsBlock: "residuals"}
-
-    def _progress(self) -> Progress:
-        total = self.tests[-1].samples if self.tests else 0
-        return Progress(0, total, self.next, done=bool(total) and self.next == total)
-
-    def _on_samples(self, message) -> None:
-        super()._on_samples(message)
-        for kind, publisher in zip(self.kinds, getattr(self, "out", [])):
-            if message.number < self.silent_from:
-                publisher.publish(kind(run=message.run, number=message.number, time_ns=message.time_ns))
-        self.next = message.number + len(message.time_ns)
-
-    def _again(self, request, response):
-        if request.start >= 36:
-            response.message = f"samples {request.start} to {request.stop - 1} have not all been seen"
-            return response
-        response.success = True
-        for kind, topic in self.kinds.items():
-            times = [0] * min(4, request.stop - request.start)
-            setattr(response, topic, kind(run=request.run, number=request.start, time_ns=times))
-        return response
 
 
 @pytest.fixture
@@ -254,58 +174,3 @@ def test_it_waits_for_the_last_word_of_a_diagnosis(bag, tmp_path):
         status, _, errors = record.end()
     assert (status, errors) == (0, "")
     assert messages(file)["/diagnosis/ranking"] == 1
-
-
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
-def test_a_signal_ends_it_in_time_with_a_whole_file(bag, tmp_path, number):
-    file = tmp_path / "e.mcap"
-    with Record(file, wait_for=0) as record:
-        with Replay(bag, rate=0.01, wait_for=1, wait_timeout=PATIENCE):
-            wait_until(lambda: file.exists() and messages(file)["/samples"] > 5)
-            began = time.monotonic()
-            status, _, errors = record.end(number)
-            assert time.monotonic() - began < 5.0
-    assert status == 1 and "record was told to end" in errors and errors.count("\n") == 0
-    with file.open("rb") as stream:
-        assert make_reader(stream).get_summary().statistics.message_count == messages(file).total()
-
-
-def test_where_the_disk_is_full_it_says_so_and_the_file_can_be_read(tmp_path):
-    """A limit on the file's size stands for the disk's."""
-    bag, file = write_bag(some_recording(30_000), tmp_path / "b.mcap"), tmp_path / "e.mcap"
-    with Record(file, limit=3 << 19, wait_for=0) as record:
-        with Replay(bag, rate=10.0, wait_for=1, wait_timeout=PATIENCE):
-            status, output, errors = record.end()
-    assert (status, output) == (1, "")
-    assert errors == f"error: {file}: File too large: the recording ends here; what came before can be read"
-    assert len(read_bag(file)) > 1000
-
-
-def test_stopped_for_longer_than_the_middleware_waits_it_asks_for_what_it_missed(tmp_path):
-    recording = some_recording(1500)
-    bag, file = write_bag(recording, tmp_path / "b.mcap"), tmp_path / "e.mcap"
-    with Record(file, wait_for=0) as record:
-        with Replay(bag, rate=0.1, wait_for=1, wait_timeout=PATIENCE) as replay:
-            wait_until(lambda: file.exists() and messages(file)["/samples"] > 100)
-            record.process.send_signal(signal.SIGSTOP)
-            time.sleep(9.0)
-            before = messages(file)["/samples"]
-            record.process.send_signal(signal.SIGCONT)
-            replay.end()
-        status, output, errors = record.end()
-    assert (status, errors) == (0, ""), output
-    assert before < 1000
-    assert len(read_bag(file)) == 1500
-
-
-def test_killed_at_any_moment_its_file_can_be_read_and_lacks_next_to_nothing(monkeypatch):
-    """Five moments; fifty: `python -m crash_replay.record_killed`, which asks for half a second.
-
-    Here it is 5 s: beside other tests `record` may get no processor for longer than half a second (3 of 50 did not at a
-    load of 20), and no test fails by the clock; what it holds back longer than that it would hold back for ever.
-    """
-    for name, value in {**environment(), "ROS_DOMAIN_ID": str(DOMAIN)}.items():
-        monkeypatch.setenv(name, value)
-    found = list(record_killed.kills(5, seed=3))
-    assert all(not killed.fault and killed.oldest_missing < 5.0 for killed in found), found
-    assert sum(killed.messages for killed in found) > 1000

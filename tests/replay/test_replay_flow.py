@@ -1,6 +1,6 @@
 """A replay waits for its subscribers: with publishers that acknowledge when the test lets them."""
 
-from crash_replay.flow import BYTES, LATE, ON_TIME, PATIENCE, Flow
+from crash_replay.flow import BYTES, LATE, ON_TIME, PATIENCE, PATIENCE_AGAIN, Flow
 
 
 class Publisher:
@@ -115,3 +115,25 @@ def test_it_says_so_when_a_subscriber_takes_nothing_and_goes_on():
     assert warnings[1:] == ["a subscriber has taken nothing for 10 s: going on, it may lose samples"]
     flow.sent(LATE, 0)
     assert not flow.has_room(70.0, on_time=False)
+
+
+def test_who_takes_nothing_is_waited_for_long_only_once_until_something_is_taken():
+    """Else each LATE messages of a recording cost PATIENCE, where a listener is stopped and the clock is lost."""
+    publisher = Publisher()
+    publisher.acknowledged = False
+    flow, warnings = flow_of(publisher)
+    now = 50.0
+    for patience in (PATIENCE, PATIENCE_AGAIN, PATIENCE_AGAIN):
+        flow.sent(LATE, 0)
+        assert not flow.has_room(now, on_time=False)
+        assert not flow.has_room(now + 0.9 * patience, on_time=False)
+        now += 1.1 * patience
+        assert flow.has_room(now, on_time=False)
+    assert sum("going on" in line for line in warnings) == 1
+    publisher.acknowledged = True
+    flow.sent(LATE, 0)
+    assert flow.has_room(now, on_time=False)
+    publisher.acknowledged = False
+    flow.sent(LATE, 0)
+    assert not flow.has_room(now, on_time=False)
+    assert not flow.has_room(now + 0.9 * PATIENCE, on_time=False), "it has taken part again"

@@ -8,6 +8,8 @@ import pytest
 from helpers_viewer import recorder, rows, settle
 from helpers_waiting import PATIENCE
 
+from crash_estimator.viewer import show
+from crash_estimator.viewer.passes import Pass
 from crash_estimator.viewer.recorder import Recorder
 from crash_estimator.viewer.sinks import Sinks
 
@@ -34,6 +36,45 @@ def test_passes_that_are_over_take_neither_threads_nor_memory(tmp_path):
     target.close()
     assert target.faults == []
     assert len(list(tmp_path.glob("*.rrd"))) < 5
+
+
+def test_passes_that_follow_faster_than_they_are_judged_are_only_drawn(tmp_path, monkeypatch):
+    """All in one batch: the first, which is in the file, and the newest are judged, those between are overtaken."""
+    crash, judged = crash_data.simulate(n=SHORT), []
+    target = recorder(tmp_path / "first.rrd")
+    judge = Pass.judge
+    monkeypatch.setattr(Pass, "judge", lambda self: (judged.append(self) if self.jury else None, judge(self)))
+    goes_on = Event()
+    target.put(lambda: goes_on.wait(PATIENCE) and None)
+    target.put(lambda: crash_data.test_block(crash))
+    for run in range(6):
+        for name in crash_data.NAMES:
+            for block in crash_data.estimates(crash, name, run=run):
+                target.put(lambda block=block: block)
+    goes_on.set()
+    settle(target)
+    kept = list(target._passes)
+    target.close()
+    assert target.faults == []
+    assert kept[-1] == (0, 5) and 2 <= len({id(one) for one in judged}) < 5
+
+
+def test_tests_of_one_structure_and_length_share_a_layout(tmp_path, monkeypatch):
+    """The server of the viewers keeps each that it is sent."""
+    sent = []
+    monkeypatch.setattr(show, "send_layout", lambda recording, layout, activate: sent.append(layout))
+    target = Recorder(Sinks(0, tmp_path / "tests.rrd"))
+    for k in range(4):
+        crash = crash_data.simulate(n=SHORT if k < 3 else SHORT + 7)
+        target.put(lambda crash=crash, k=k: crash_data.test_block(crash)._replace(id=f"test {k}"))
+        for block in crash_data.estimates(crash, "mrls"):
+            target.put(lambda block=block: block)
+        settle(target)
+    files = len(list(tmp_path.glob("*.rrd")))
+    target.close()
+    assert len(sent) > files, "the live viewers have got theirs"
+    live = len(sent) - files
+    assert live < 4, sent
 
 
 def test_tests_that_come_faster_than_they_are_drawn_stay_apart(tmp_path):

@@ -32,6 +32,6 @@ def first_sentence(found: Diagnosis, model: str, test: str) -> str:
     )
     rest = "" if found.complete else ", and what is left is more than noise"
     return (
-        f"Model {model} lacks {lacks}: with it the error on test {test} falls from {before} to {after} RMS; the sensors' "
-        f"noise is {floor}{rest}."
+        f"Model {model} lacks {lacks}: with it the error on test {test} falls from {before} to {after} RMS; the "
+        f"sensors' noise is {floor}{rest}."
     )

@@ -1,5 +1,7 @@
-"""What a page is made of, before anybody decides whether it becomes HTML or Markdown. All texts are plain: whoever writes
-a page escapes them."""
+"""What a page is made of, before anybody decides whether it becomes HTML or Markdown.
+
+All texts are plain: whoever writes a page escapes them.
+"""
 
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -50,7 +50,8 @@ def write_report(
 ) -> Path:
     """Write `report.html` into the folder, with `markdown` also `report.md` and its figures -> the page.
 
-    The settings go to the methods that have them; seconds: after which the diagnosis tries nothing more; `told` hears of each part when it is done, and how long it took.
+    The settings go to the methods that have them; seconds: after which the diagnosis tries nothing more; `told` hears of
+    each part when it is done, and how long it took.
     """
     if not ((recording.time > 0.0) & (recording.time <= end)).any():
         raise ModelError(f"test {recording.test.id} has no samples between the impact and {end:g} s")
@@ -115,7 +116,7 @@ def _test(recording: Recording, structure: Structure, end: float) -> list[Block]
 def _missing(
     recording: Recording, structure: Structure, end: float, effects: Mapping[str, Effect], seconds: float
 ) -> tuple[str, list[Block]]:
-    """The page's first sentence and what `diagnose` says; or why it says nothing, which is no reason to say nothing else."""
+    """The page's first sentence and what `diagnose` says; or why it says nothing: the rest is said all the same."""
     until = recording.time <= end
     judged = Recording(recording.test, recording.time_ns[until], recording.values[until])
     try:

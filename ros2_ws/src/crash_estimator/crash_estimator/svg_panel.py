@@ -27,8 +27,8 @@ def svg_panel(panel: Panel, height: int) -> str:
 
     parts = [f'<svg viewBox="0 0 {WIDTH} {height}" role="img" aria-label="{_shown(panel.title)}">']
     parts += _axes(panel, x_range, y_range, at, right, bottom)
-    parts.append(f'<clipPath id="inside{height}"><rect x="{LEFT}" y="{TOP}" width="{right - LEFT}" height="{bottom - TOP}"/>'
-                 "</clipPath>")  # fmt: skip
+    inside = f'<rect x="{LEFT}" y="{TOP}" width="{right - LEFT}" height="{bottom - TOP}"/>'
+    parts.append(f'<clipPath id="inside{height}">{inside}</clipPath>')
     parts.append(f'<g clip-path="url(#inside{height})">')
     colours = _colours(panel.lines)
     for line, colour in zip(panel.lines, colours):

@@ -79,7 +79,7 @@ def _parser() -> argparse.ArgumentParser:
     forms = "; ".join(reader.expects for reader in READERS)
     parser = Parser(
         prog="import",
-        description=f"Make a bag of a recording. SOURCE is one of: {forms}; nhtsa:NUMBER, a test of NHTSA's public database.",
+        description=f"Make a bag of a recording. SOURCE is one of: {forms}; nhtsa:NUMBER, a test of NHTSA's database.",
         epilog=NAMES_HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -2,13 +2,13 @@
 
 What is found does not depend on the stated time zero.
 
-1. Noise. Each acceleration and force has its mean and standard deviation from the record's first samples, at rest; noise
-   whose neighbours are alike counts for as much less, by how means of RUN scatter there.
-2. Alarm. The first instant at which the mean over RUN of any channel leaves its rest by more than ALARM standard deviations
-   of such means, and HOLDS for as long again.
+1. Noise. Each acceleration and force has its mean and standard deviation from the record's first samples, at rest;
+   noise whose neighbours are alike counts for as much less, by how means of RUN scatter there.
+2. Alarm. The first instant at which the mean over RUN of any channel leaves its rest by more than ALARM standard
+   deviations of such means, and HOLDS for as long again.
 3. Change point. Around the alarm, for every instant k: before k a channel is at rest, from k on it follows
-   b0 + b1 (t - t_k) + b2 (t - t_k)^2, with its own coefficients by least squares. Onset is the k with the smallest sum of
-   squared residuals, in units of the channels' noise, over all channels that have woken by the end of the window: the
+   b0 + b1 (t - t_k) + b2 (t - t_k)^2, with its own coefficients by least squares. Onset is the k with the smallest sum
+   of squared residuals, in units of the channels' noise, over all channels that have woken by the end of the window: the
    maximum of the likelihood of a change from rest to a smooth rise.
 
 A jump is found to the sample; a rise out of the noise as precisely as its slope allows: the instants that fit almost as
@@ -26,8 +26,11 @@ from .recording import Recording, RecordingError
 AT_REST = 0.010
 """s of the record's beginning that tell the noise; a record that has less before the impact has no onset to find."""
 LEAST_AT_REST = 40
-RUN, LEAST_RUN = 0.0005, 5  # s, and samples
+"""Samples: their standard deviation is known to a tenth."""
+RUN, LEAST_RUN = 0.0005, 5
+"""s, and samples, of the means that are watched: shorter than the rise of any structure, longer than a spike."""
 ALARM, HOLDS = 8.0, 2
+"""Standard deviations, which white noise does not reach in any record, and runs that a spike does not last."""
 BACK, AHEAD = 0.004, 0.0015
 """s before and after the alarm in which the change point is sought and fitted."""
 LEAST_AHEAD = 12

@@ -1,4 +1,4 @@
-"""How far a long piece of work is, with the seconds that it has taken: lines on standard error, none for a short one."""
+"""How far a long piece of work is, and the seconds that it has taken: lines on standard error, none for a short one."""
 
 import sys
 import time

@@ -124,20 +124,21 @@ class Live:
                 graph.spin_until(lambda: graph.listener.count_subscribers("/node/forces") > 0, "the viewer listens")
             return graph.replay(bag, 1 + viewer, rate=FLAT_OUT, block=block)
 
-    def viewer(self) -> Iterator[Row]:
-        bag = self.bag(4, self.effort.seen, 10e3)
-        passes = (lambda on=on: self._pass(bag, block=0, viewer=on).per_second for on in (False, True))
+    def _without_and_with(self, listener: str, seconds: float, block: int) -> tuple[np.ndarray, float, float]:
+        """Samples a second in turns without and with one more listener, and their medians."""
+        bag = self.bag(4, seconds, 10e3)
+        passes = (lambda on=on: self._pass(bag, block, **{listener: on}).per_second for on in (False, True))
         rounds = self._in_turns(*passes)
-        without, with_it = np.median(rounds, axis=0)
+        return rounds, *np.median(rounds, axis=0)
+
+    def viewer(self) -> Iterator[Row]:
+        rounds, without, with_it = self._without_and_with("viewer", self.effort.seen, block=0)
         what = "the viewer's cost on the estimator's throughput, in a rush: forces are made and all is drawn after it"
         said = f"{with_it:,.0f} /s with it", f"{without:,.0f} /s without"
         yield Row(what, *said, 1.0 - ratio(rounds, 1, 0), 0.05, least=False)
 
     def named(self) -> Iterator[Row]:
-        bag = self.bag(4, self.effort.singles, 10e3)
-        passes = (lambda on=on: self._pass(bag, block=1, named=on).per_second for on in (False, True))
-        rounds = self._in_turns(*passes)
-        without, with_it = np.median(rounds, axis=0)
+        rounds, without, with_it = self._without_and_with("named", self.effort.singles, block=1)
         what = "samples a second, single messages, while somebody listens to parameters and residuals by name as well"
         yield Row(what, f"{with_it:,.0f} /s", f"{without:,.0f} /s to blocks alone", ratio(rounds, 1, 0))
 

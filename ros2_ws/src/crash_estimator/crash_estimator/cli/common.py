@@ -23,7 +23,7 @@ RECORDING = "a recording in any form: bag, CSV with its YAML, NHTSA EV5 or ISO-M
 
 
 def read_crash(source: str) -> Recording:
-    """A recording of any form with something of a crash in it; raises RecordingError where it ends before the impact."""
+    """A recording of any form with some of a crash in it; raises RecordingError where it ends before the impact."""
     recording = read_source(source)
     if not recording.time_ns[-1] >= 0:
         end = recording.time_ns[-1] * 1e-6
@@ -38,6 +38,24 @@ def check_written(arguments: argparse.Namespace, *recordings: str | None, **outp
     `--json out.json`. Raises OutputError."""
     read = [*recordings, model_path(arguments.model), arguments.effects]
     check_outputs({f"--{option}": path for option, path in outputs.items()}, read)
+
+
+def add_time_limit(parser: argparse.ArgumentParser, default: float = math.inf) -> None:
+    parser.add_argument(
+        "--time-limit", metavar="S", type=_seconds, default=default,
+        help="after so many seconds the diagnosis tries nothing more, and the best answer so far is given"
+        + (f"; default {default:g}" if math.isfinite(default) else ""),
+    )  # fmt: skip
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not seconds > 0.0:
+        raise argparse.ArgumentTypeError(f"a time limit is a number of seconds above 0, got {text!r}")
+    return seconds
 
 
 def add_effects_option(parser: argparse.ArgumentParser) -> None:

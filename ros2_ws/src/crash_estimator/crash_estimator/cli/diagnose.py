@@ -1,7 +1,6 @@
-"""`diagnose RECORDING [RECORDING ...] --model M`: which physical effect is missing from a model, by one or more recordings."""
+"""`diagnose RECORDING [RECORDING ...] --model M`: which physical effect is missing from a model, by recordings of it."""
 
 import argparse
-import math
 import sys
 from dataclasses import replace
 from io import StringIO
@@ -21,7 +20,7 @@ from ..core.structure import EffectSpec, ModelError
 from ..diagnosis_doubt import doubt
 from ..diagnosis_tables import diagnosis_tables
 from ..model_file import load_model, model_path, ready_models
-from .common import RECORDING, add_effects_option, check_written, effects_of, read_crash, write_json
+from .common import RECORDING, add_effects_option, add_time_limit, check_written, effects_of, read_crash, write_json
 
 
 def main() -> None:
@@ -45,10 +44,7 @@ def _parser() -> Parser:
         "as in 5%%; a model that is as good is adequate as it is. Default: 1%% completes an explanation, no more",
     )  # fmt: skip
     parser.add_argument("--json", metavar="FILE", help="write everything that was found")
-    parser.add_argument(
-        "--time-limit", metavar="S", type=_seconds, default=math.inf,
-        help="after so many seconds nothing more is tried, and the best answer so far given",
-    )  # fmt: skip
+    add_time_limit(parser)
     add_effects_option(parser)
     return parser
 
@@ -58,16 +54,6 @@ def _tolerance(text: str) -> Tolerance:
         return tolerance_of(text)
     except ModelError as error:  # argparse says what its own errors say
         raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = math.nan
-    if not seconds > 0.0:
-        raise argparse.ArgumentTypeError(f"a time limit is a number of seconds above 0, got {text!r}")
-    return seconds
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -1,4 +1,4 @@
-"""`report RECORDING --model M --to DIR`: the thesis's tables and figures for one recording, as one HTML page that opens anywhere."""
+"""`report RECORDING --model M --to DIR`: the thesis's tables and figures for one recording, as one HTML page."""
 
 import argparse
 import sys
@@ -13,10 +13,9 @@ from crash_replay.output import OutputError
 from crash_replay.said import Parser, say
 
 from ..core.methods import METHODS
-from ..core.structure import ModelError
 from ..model_file import load_model, ready_models
 from ..report_page import write_report
-from .common import RECORDING, add_effects_option, check_written, effects_of, read_crash
+from .common import RECORDING, add_effects_option, add_time_limit, check_written, effects_of, read_crash
 from .simulate import smoother
 
 DIAGNOSED_FOR = 8.0
@@ -40,10 +39,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "--cfc", type=int, choices=(0, *CFC_CLASSES), default=None, help="filter of the free run's signals; 0: none"
     )
-    parser.add_argument(
-        "--time-limit", type=float, default=DIAGNOSED_FOR, metavar="S",
-        help="after so many seconds the diagnosis tries nothing more, and the page says so (default: %(default)g)",
-    )  # fmt: skip
+    add_time_limit(parser, DIAGNOSED_FOR)
     add_effects_option(parser)
     return parser
 
@@ -52,8 +48,6 @@ def report(arguments: argparse.Namespace) -> None:
     folder = Path(arguments.to)
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"{visible(folder)} is a file: --to takes a folder")
-    if not arguments.time_limit > 0.0:
-        raise ModelError(f"--time-limit must be a number of seconds above 0, got {arguments.time_limit:g}")
     check_written(arguments, arguments.bag, to=folder / "report.html")
     effects = effects_of(arguments)
     structure = load_model(arguments.model, effects)

@@ -10,149 +10,24 @@ A free body gives one equation, divided by its mass so that measured, predicted 
 the accelerometer's m/s^2; a fixed body with a measured force gives another, in N, the force on it.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
 from typing import NoReturn
 
 import numpy as np
 
-from crash_replay.fault import Fault
 from crash_replay.recording import Test
+
+from .structure_parts import Action, Body, Coefficient, EffectSpec, Element, ModelError, Parameter, Term
+
+__all__ = ["Action", "Body", "Coefficient", "EffectSpec", "Element", "ModelError", "Parameter", "Structure", "Term"]
 
 CONTACT_FREQUENCY = 30.0
 """rad/s: a quarter period of 50 ms, a crash's time scale; with a mass it gives a stiffness's order of magnitude."""
 
 TYPICAL_CRUSH, TYPICAL_RATE = 0.1, 5.0
 """m, m/s: where a higher power is taken to be as large as the first, for its order of magnitude."""
-
-
-class ModelError(Fault):
-    """The model is at fault, or does not fit the test; the message is one readable line.
-
-    keys: where a model file has what is at fault, such as ("elements", "door_rib", "between").
-    """
-
-    def __init__(self, message: str, keys: tuple[str | int, ...] = ()):
-        super().__init__(message)
-        self.keys = keys
-
-
-@dataclass(frozen=True)
-class Body:
-    """A lumped mass, a driven motion or a fixed wall."""
-
-    name: str
-    mass: float | None = None  # kg; only a free body needs one
-    acceleration: tuple[str, ...] = ()  # channels; their mean is the body's acceleration
-    driven: bool = False  # motion taken from its channels (forced displacement, thesis 6.4.1)
-    fixed: bool = False
-    force: str | None = None  # channel of the measured force on a fixed body
-    noise: float | None = None  # standard deviation of its equation's error, m/s^2 or N; None: found from the data
-    carried_by: str | None = None  # a driven body within another one, which feels what pushes it
-    start: tuple[float, float] = (0.0, 0.0)  # m, m/s at time zero, where the test does not say
-
-    @property
-    def free(self) -> bool:
-        return not (self.driven or self.fixed)
-
-
-@dataclass(frozen=True)
-class Coefficient:
-    """A stiffness (N/m) or damping (N s/m): known, or estimated from an initial value."""
-
-    value: float = 0.0  # the known value, or the initial one
-    estimated: bool = False
-    std: float | None = None  # of the initial value; None: as large as the value's order of magnitude
-    min: float = -np.inf
-    max: float = np.inf
-    drift: float | None = None  # relative random walk per e-fold of crush; None: by shape
-    shape: str = "curve"  # structured fit: "curve" = F(X) free in crush, "constant" = one K
-
-
-@dataclass(frozen=True)
-class Term:
-    """One more power of the crush or of its rate in an element's force (equation 4.1): coefficient sign(u) |u|^power.
-
-    u is X or V. The sign makes even powers pull in tension and take energy in both directions, as the odd ones do.
-    """
-
-    of: str  # "crush" or "rate"
-    power: int  # 2 or more
-    coefficient: Coefficient  # N/m^power, or N (s/m)^power
-
-
-@dataclass(frozen=True)
-class Element:
-    """A spring and damper between two bodies."""
-
-    name: str
-    between: tuple[str, str]
-    stiffness: Coefficient
-    damping: Coefficient = Coefficient()
-    tension: bool = True  # False: carries compression only
-    unloading: float | None = None  # known unloading stiffness, N/m; None: elastic
-    displacement: str | None = None  # channel of the crush, instead of integrating accelerations
-    velocity: str | None = None  # channel of the rate of crush; None: the crush's derivative
-    terms: tuple[Term, ...] = ()  # powers beyond the first
-    damper_pulls: bool = True  # without tension: the damper may pull until the spring is spent; False: never
-    unloading_slope: Coefficient | None = None  # an unloading stiffness to be estimated, in place of a known one
-    origin: float = 0.0  # m: the crush counts from here, as beyond a gap
-    factor: Callable[[np.ndarray], np.ndarray] | None = None  # of the rates (n,) m/s: what multiplies the static force
-
-
-@dataclass(frozen=True)
-class EffectSpec:
-    """A physical effect beside the springs and dampers; types and what they need are in `core.effects`."""
-
-    type: str
-    target: str  # element, body or channel; "body_a-body_b" for a load path
-    coefficient: float | None = None  # where it starts; None: found from the data
-    shape: Mapping[str, float] = field(default_factory=dict)  # shape constants, likewise
-    host: str | None = None  # unmodelled_body: the body that feels its inertia
-    touches: str | None = None  # unmodelled_body: the body that it pushes by a curve of its own
-    taken_from: str | None = None  # unmodelled_body: the body whose mass it was counted in
-    variant: str = ""  # load_path: "", "absolute", "one_way" or "one_way_back"
-
-
-@dataclass(frozen=True)
-class Action:
-    """An effect that no element or body has a place for; `core.effects.applied` makes them, `core.actions` acts.
-
-    force gives, by kind: element, N of an ElementMotion (g,); memory, what `HystereticForce` says; factor, h of the
-    rate (g,); body, N of the time (g,) s.
-    """
-
-    name: str  # of its parameter, such as door_rib.coulomb_friction
-    unit: str
-    kind: str  # element, memory, factor, body, inertia, mass, gain or offset
-    at: int  # the element, or the body: of "inertia" the one that feels it
-    coefficient: Coefficient
-    scale: float  # order of magnitude of the coefficient
-    force: Callable | None = None
-    body: int = -1  # inertia: whose
-    lighter: int = -1  # inertia: the body whose mass it was counted in, -1: none
-    share: float = 1.0  # gain, offset: of the channel in its body's acceleration
-
-    @property
-    def element(self) -> int:
-        """The element that it acts on; -1: none."""
-        return self.at if self.kind in ("element", "memory", "factor") else -1
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One entry of theta: a coefficient with its name, unit and scale."""
-
-    name: str
-    unit: str
-    element: int  # -1: of no element
-    is_stiffness: bool
-    coefficient: Coefficient
-    scale: float  # order of magnitude, for the initial standard deviation
-    power: int = 1  # of the crush or rate
-    is_unloading: bool = False  # the slope of the unloading line
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ..viewer.findings import FOUND, Candidate, MisfitBlock, RankingBlock, Window
+from ..viewer.findings import EFFECT_MISSING, FOUND, Candidate, MisfitBlock, RankingBlock, Window
 from ..viewer.summary import with_std
 from ..viewer.units import shown
 
@@ -26,7 +26,10 @@ class Story:
     @property
     def complete(self) -> bool:
         """Whether the last answer that is to be expected has come: with what was found added, if anything was."""
-        return bool(self.finals) and (not self.finals[min(self.finals)].found or len(self.finals) > 1)
+        if not self.finals:
+            return False
+        first = self.finals[min(self.finals)]
+        return self.added or not (first.found and first.verdict == EFFECT_MISSING)
 
     @property
     def added(self) -> bool:
@@ -55,7 +58,7 @@ class Story:
         return [f"all samples: {block.said}; {errors}"]
 
     def _sign(self, block: RankingBlock) -> list[str]:
-        best = block.ranking[0] if block.ranking and block.verdict == "effect_missing" else None
+        best = block.ranking[0] if block.ranking and block.verdict == EFFECT_MISSING else None
         name = best.name if best else ""
         self.led = self.led + 1 if name == self.leader else 1
         self.leader = name
@@ -79,10 +82,11 @@ def _lacks(block: RankingBlock) -> list[str]:
     best = block.ranking[0] if block.ranking else None
     if best is None or best.evidence < FOUND:
         return []
+    said = "what it lacks" if block.verdict == EFFECT_MISSING else "the best candidate, which does not explain it"
     rivals = f"not told from it here: {_listed(best.confounded_with)}"
     share = f"{block.force_explained_before:.0%} -> {block.force_explained_after:.0%}"
     force = f"share of {block.force} that the inertias explain: {share}"
-    return [f"what it lacks: {_named(best)}"] + [rivals] * bool(best.confounded_with) + [force] * bool(block.force)
+    return [f"{said}: {_named(best)}"] + [rivals] * bool(best.confounded_with) + [force] * bool(block.force)
 
 
 def _named(one: Candidate) -> str:

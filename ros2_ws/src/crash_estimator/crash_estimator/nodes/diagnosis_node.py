@@ -6,11 +6,9 @@ a new revision of its model, and the same question is asked of it on the samples
 """
 
 import sys
-from collections.abc import Callable
 from functools import partial
 
 from crash_msgs.msg import Samples, TestInfo
-from crash_msgs.srv import AddEffect, RemoveEffect
 from rclpy.node import Node
 from rclpy.task import Future
 
@@ -25,9 +23,8 @@ from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import stamp, stamp_ns, test_from_msg
 from crash_replay.ros_runtime import run
 
-from ..core.diagnosis import OnlineAnswer
+from ..core.diagnosis import UNEXPLAINED, OnlineAnswer
 from ..core.effects import EFFECTS
-from ..core.effects.change import remove_effect
 from ..core.effects.user import load_effects
 from ..core.kinematics import Kinematics
 from ..core.structure import ModelError, Structure
@@ -39,8 +36,8 @@ from .channel_feed import ChannelFeed
 from .diagnosis_messages import Moment
 from .diagnosis_telling import Telling
 from .diagnosis_worker import Task, Worker, WorkerError
-from .effect_requests import request_of, with_effect
 from .hearing import hear
+from .model_revisions import ModelRevisions
 from .node_health import diagnosis_health
 from .samples import Received, fitting, received, rows_of, what_is_wrong
 
@@ -56,7 +53,7 @@ PARAMETERS = {
     "with_bags": Allowed([""], "other recordings of the same structure, used with the replayed one"),
     "effects": Allowed("", "your own effects, a .py file; it is executed"),
     "every": Allowed(0.002, "s of the crash between two rankings", 1e-5, 1e4),
-    "add_first": Allowed(False, "add the first effect that a final answer names, once"),
+    "add_first": Allowed(False, "add the first effect that a final answer names, once; none where it is unexplained"),
     "estimators": Allowed([""], "names of estimators that it is added to as well", pattern=NAME),
     "replay": Allowed("replay", "node that samples are asked of which were missed", pattern=NAME),
 }
@@ -70,10 +67,10 @@ class DiagnosisNode(Node):
         model, effects, replay = asked["model"], asked["effects"], asked["replay"]
         self.adds, self.every_ns = asked["add_first"], round(asked["every"] * 1e9)
         self.effects = EFFECTS | (load_effects(effects) if effects else {})
-        self.structure, self.revision = load_model(model, self.effects), 0
+        structure = load_model(model, self.effects)
         self.bags = names_in(asked["with_bags"])
         for bag in self.bags:
-            Kinematics(self.structure, read_bag(bag).test)
+            Kinematics(structure, read_bag(bag).test)
         self.kept: Kept | None = None  # None: no test yet, or one that the model does not fit
         self.time_zero = 0  # stamp of the impact, ns
         self.run, self.total, self.end = 0, 0, 0  # samples of the test; number of the next sample
@@ -86,13 +83,11 @@ class DiagnosisNode(Node):
         self.rest_of = 0  # the pass that what has not come is asked of
         self.finals: dict[tuple[int, int], OnlineAnswer] = {}  # by revision and samples missing
         self.complaints = Complaints(lambda line: self.get_logger().error(line))
-        self.telling = Telling(self, self.structure)
-        self.worker = Worker(self.structure, effects, self.bags)
-        self.also_add = {
-            name: self.create_client(AddEffect, f"{name}/add_effect") for name in names_in(asked["estimators"])
-        }
-        self.create_service(AddEffect, "~/add_effect", self._on_add_effect)
-        self.create_service(RemoveEffect, "~/remove_effect", self._on_remove_effect)
+        self.telling = Telling(self, structure)
+        self.worker = Worker(structure, effects, self.bags)
+        test = lambda: self.kept.test if self.kept else None  # noqa: E731
+        others = names_in(asked["estimators"])
+        self.model = ModelRevisions(self, structure, self.effects, others, test, self._on_other_model)
         self.attending = Attending(self, "diagnosis", self._progress)
         self.asking = Asking(self, f"{replay}/get_samples", self.attending, self._on_samples_again, self._fitting)
         self.catching_up = CatchingUp(self, self.attending, self._place, self._ask_for_rest)
@@ -102,6 +97,15 @@ class DiagnosisNode(Node):
         hear(self, self.complaints, Samples, "samples", self._on_samples, EVERY_SAMPLE, received)
         self.create_timer(LOOK, self._look)
         self.attending.tell()
+
+    @property
+    def structure(self) -> Structure:
+        """The model that is asked about, with what was added to it."""
+        return self.model.structure
+
+    @property
+    def revision(self) -> int:
+        return self.model.number
 
     def destroy_node(self) -> None:
         self.worker.close()
@@ -257,44 +261,13 @@ class DiagnosisNode(Node):
 
     def _add_found(self, at: Moment, answer: OnlineAnswer) -> None:
         self.finals[at.revision, self.kept.missing(at.number + 1)] = answer
-        if self.adds and answer.found:
+        if self.adds and answer.found and answer.verdict != UNEXPLAINED:
             self.adds = False
-            request = request_of(answer.found[0])
-            self._add_to_estimators(request)
-            self.get_logger().info(self._on_add_effect(request, AddEffect.Response()).message)
+            self.model.add(answer.found[0])
 
-    # the model's revisions
-
-    def _add_to_estimators(self, request: AddEffect.Request) -> None:
-        for name, client in self.also_add.items():
-            if not client.service_is_ready():
-                self.get_logger().warning(f"there is no service {client.srv_name}: is there an estimator {name}?")
-                continue
-            client.call_async(request).add_done_callback(lambda call, name=name: self._say(name, call.result()))
-
-    def _say(self, name: str, response: AddEffect.Response) -> None:
-        log = self.get_logger()
-        (log.info if response.success else log.warning)(f"{name}: {response.message}")
-
-    def _on_add_effect(self, request: AddEffect.Request, response: AddEffect.Response) -> AddEffect.Response:
-        test = self.kept.test if self.kept else None
-        return self._change(lambda: with_effect(self.structure, request, self.effects, test), response)
-
-    def _on_remove_effect(
-        self, request: RemoveEffect.Request, response: RemoveEffect.Response
-    ) -> RemoveEffect.Response:
-        return self._change(lambda: remove_effect(self.structure, request.effect, request.target), response)
-
-    def _change(self, change: Callable[[], Structure], response):
-        try:
-            self.structure = change()
-        except ModelError as error:
-            response.message = str(error)
-            return response
-        self.revision += 1
+    def _on_other_model(self) -> str:
         self._begin_anew()
-        response.success, response.message = True, f"revision {self.revision}: {self.telling.name(self.structure)}"
-        return response
+        return self.telling.name(self.structure)
 
 
 def main() -> int:

@@ -10,6 +10,8 @@ import numpy as np
 
 FOUND = 6.0
 """Nats of evidence from which a candidate counts."""
+EFFECT_MISSING = "effect_missing"
+"""The verdict that names what the model lacks (Ranking.msg)."""
 
 
 class Candidate(NamedTuple):
@@ -58,7 +60,7 @@ class RankingBlock(NamedTuple):
     @property
     def said(self) -> str:
         """The verdict in words."""
-        grade = "" if self.complete or self.verdict != "effect_missing" else ", and not all that is missing"
+        grade = "" if self.complete or self.verdict != EFFECT_MISSING else ", and not all that is missing"
         return f"{self.verdict.replace('_', ' ')}{grade}"
 
 

@@ -14,7 +14,7 @@ from .axes import Axis
 from .cast import MEASURED, Cast, Color
 from .curves import BAND
 from .drawing import Drawing, Frame, view
-from .findings import MisfitBlock, RankingBlock, RevisionBlock, Window
+from .findings import EFFECT_MISSING, MisfitBlock, RankingBlock, RevisionBlock, Window
 from .loops import INK
 from .pen import Pen, path
 from .ranking import FLOOR, Step, error_drawing, revision_color
@@ -88,7 +88,7 @@ class Revisions:
             if ranking.final:
                 steps[-1] = steps[-1]._replace(white=ranking.white_after)
         else:
-            found = ranking.verdict == "effect_missing" and ranking.ranking
+            found = ranking.verdict == EFFECT_MISSING and ranking.ranking
             steps = [Step("as given", ranking.rms_before, ranking.white_before)]
             steps += [Step(f"+ {ranking.ranking[0].name}", ranking.rms_after, ranking.white_after)] if found else []
         drawing = error_drawing(steps, ranking.noise_floor, cast.shown("m/s^2"))

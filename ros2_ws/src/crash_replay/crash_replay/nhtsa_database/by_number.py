@@ -81,8 +81,8 @@ def _fetch(client: PoliteClient, number: int, folder: Path) -> None:
             assemble(client, number, parts)
     except Unreachable as error:
         raise RecordingError(
-            f"{PREFIX}{number}: {error}; what has come is kept and gone on with. An EV5 folder of the test that you have "
-            f"can be put at {folder}"
+            f"{PREFIX}{number}: {error}; what has come is kept and gone on with. An EV5 folder of the test that you "
+            f"have can be put at {folder}"
         ) from None
     parts.replace(folder)
 

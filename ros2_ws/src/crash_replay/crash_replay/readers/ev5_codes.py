@@ -1,7 +1,8 @@
 """What the codes of an EV5 header stand for: what a sensor is attached to (SENATT) and at whose seat (SENLOC).
 
-The codes are those of NHTSA's test reference guide, version 5, as far as their meaning is certain. A code that is not
-here keeps its letters as its name, which still tells it from every other.
+The codes are of NHTSA's test reference guide, version 5, which was not at hand: SEEN stand in headers beside a comment
+that says what they are (NHTSA's test 10146); READ are what their letters and like codes say, and want checking. A code
+that is in neither keeps its letters as its name, which still tells it from every other.
 """
 
 from typing import NamedTuple
@@ -15,14 +16,10 @@ class Location(NamedTuple):
     near: bool = True  # False: deforms in the crash, so that it bears witness of the body but is not the body
 
 
-LOCATIONS = {
-    # dummies
+SEEN = {
     "HDCG": Location("head"),
     "NEKU": Location("neck_upper"),
-    "NEKL": Location("neck_lower"),
     "CHST": Location("chest"),
-    "SPNU": Location("spine_upper"),
-    "SPNL": Location("spine_lower"),
     "PVCN": Location("pelvis"),
     "FMRL": Location("left_femur"),
     "FMRR": Location("right_femur"),
@@ -35,22 +32,26 @@ LOCATIONS = {
     "FTRF": Location("right_foot_front"),
     "FTRR": Location("right_foot_rear"),
     "SHBT": Location("shoulder_belt"),
-    "LPBI": Location("lap_belt_inboard"),
     "LPBO": Location("lap_belt_outboard"),
-    # vehicles
+    "FLLR": Location("floor_left_rear", "car"),
+    "FLRR": Location("floor_right_rear", "car"),
+    "ENGN": Location("engine", "engine"),
+}
+READ = {
+    "NEKL": Location("neck_lower"),
+    "SPNU": Location("spine_upper"),
+    "SPNL": Location("spine_lower"),
+    "LPBI": Location("lap_belt_inboard"),
     "VECG": Location("cg", "car"),
     "VEHC": Location("vehicle", "car"),
     "FLCF": Location("floor_center_front", "car"),
     "FLCR": Location("floor_center_rear", "car"),
     "FLLF": Location("floor_left_front", "car"),
-    "FLLR": Location("floor_left_rear", "car"),
     "FLRF": Location("floor_right_front", "car"),
-    "FLRR": Location("floor_right_rear", "car"),
     "SILL": Location("left_sill", "car"),
     "SILR": Location("right_sill", "car"),
     "TOEL": Location("left_toepan", "car", near=False),
     "TOER": Location("right_toepan", "car", near=False),
-    "ENGN": Location("engine", "engine"),
     "BRCL": Location("left_brake_caliper"),
     "BRCR": Location("right_brake_caliper"),
     "DPLC": Location("dashpanel_center"),
@@ -58,6 +59,7 @@ LOCATIONS = {
     "DPLR": Location("dashpanel_right"),
     "STCL": Location("steering_column"),
 }
+LOCATIONS = SEEN | READ
 
 FAMILIES = (
     ("FL", Location("floor", "car")),

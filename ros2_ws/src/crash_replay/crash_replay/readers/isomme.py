@@ -80,7 +80,10 @@ def _named(folder: Path, pattern: str) -> list[Path]:
 
 
 def read(path: Path, all_sensors: bool = False) -> Recording:
-    """The recording; with `all_sensors` also those that contradict the others of their body. Raises RecordingError where the header is at fault or no channel can be used."""
+    """The recording; with `all_sensors` also those that contradict the others of their body.
+
+    Raises RecordingError where the header is at fault or no channel can be used.
+    """
     headers = _named(path, r".*\.mme")
     if len(headers) != 1:
         raise RecordingError(f"{path}: expected one .mme header, found {', '.join(file.name for file in headers)}")
@@ -220,7 +223,7 @@ def _made_of_several(
     header: MmeFile, tracks: Sequence[Track], channels: Sequence[Channel], time_ns: np.ndarray, values: np.ndarray,
     notes: list[str],
 ) -> tuple[dict[Channel, np.ndarray], tuple[str, ...]]:  # fmt: skip
-    """`barrier_fx` of several cells, and the motion of cars and engines; names of the sensors that contradict others."""
+    """`barrier_fx` of several cells, the motion of cars and engines; names of the sensors that contradict others."""
     made, barrier = {}, None
     cells = [k for k, t in enumerate(tracks) if _on_barrier(t.code, channels[k]) and channels[k].axis == "x"]
     names = [channel.name for channel in channels]

@@ -25,6 +25,8 @@ SHORTLIST = 8
 """... of so many that the screening names first."""
 
 MOST_ITERATIONS = 10
+"""Of a fit that begins: an update's time is short, and the next one goes on from there."""
+
 ITERATIONS_ON = 5
 """Of a fit that goes on from the last update's: what has not settled then does so at the next one."""
 

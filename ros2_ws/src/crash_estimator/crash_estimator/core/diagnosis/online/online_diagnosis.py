@@ -26,6 +26,7 @@ from ..parameterization.layout import Layout
 from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
 from ..parameterization.model_terms import additions_of
 from ..report.ranking import ranking_of
+from ..report.verdict import ADEQUATE, EFFECT_MISSING, UNEXPLAINED
 from ..residuals.misfit_windows import misfit_windows
 from ..residuals.residuals import Residuals, analyse, noise_floor, rms
 from ..selection.fitted_model import Model
@@ -83,7 +84,7 @@ class OnlineDiagnosis:
             _finely(each, full, records) for each in ((given.residuals, residuals) if best else (given.residuals,))
         ]
         answer = OnlineAnswer(
-            verdict="effect_missing" if best else "adequate" if given.residuals.white else "unexplained",
+            verdict=EFFECT_MISSING if best else ADEQUATE if given.residuals.white else UNEXPLAINED,
             complete=residuals.white,
             text="",
             ranking=ranking_of(done),
@@ -145,9 +146,9 @@ def _text(recording: Recording, answer: OnlineAnswer) -> str:
     so_far = f"up to {recording.time_ns[-1] * 1e-6:.1f} ms: "
     floor = f"noise floor {answer.noise_floor / G:.3g}"
     before, after = (rms / G for rms in answer.rms)
-    if answer.verdict == "adequate":
+    if answer.verdict == ADEQUATE:
         return so_far + f"nothing significant is missing (residual RMS {before:.3g} g, {floor})"
-    if answer.verdict == "unexplained":
+    if answer.verdict == UNEXPLAINED:
         return so_far + f"unexplained: residual RMS {before:.3g} g, {floor}; no candidate explains it yet"
     best = answer.ranking[0]
     rivals = f", not yet told from {', '.join(best.confounded_with)}" if best.confounded_with else ""

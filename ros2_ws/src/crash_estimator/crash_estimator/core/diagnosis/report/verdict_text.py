@@ -11,9 +11,6 @@ from .ranking import StepReport
 from .tolerance import Tolerance
 from .verdict import ADEQUATE, EFFECT_MISSING, Evidence, Verdict
 
-GOES_ALONG = 0.5
-"""Share of what is left that is worth naming what it goes along with."""
-
 
 def verdict_text(
     verdict: Verdict, evidence: Evidence, tolerance: Tolerance, steps: Sequence[StepReport], first: Model,
@@ -72,7 +69,7 @@ def _unexplained(evidence: Evidence, steps, first: Model, final: Model, floor: f
     )
     done = f"{names} {'explains' if len(steps) == 1 else 'explain'} part of it; " if steps else ""
     left = f"no candidate explains what is left, most of it in {where}"
-    also = f"; it goes along with {along}" if drift.share > GOES_ALONG and not drift.constant else ""
+    also = f"; it goes along with {along}" if drift.share > THRESHOLDS.varying and not drift.constant else ""
     return f"{done}{size}; {left}{also}"
 
 

@@ -48,6 +48,7 @@ class Thresholds(NamedTuple):
 
     # How much is tried
     most_steps: int = 4
+    """Additions: what takes more is not told from a free curve that follows anything."""
     shortlist: int = 4
     """Candidates from each of the two screenings that are fitted in full ..."""
     long_list: int = 10
