@@ -13,6 +13,7 @@ from crash_replay.recording import Recording, RecordingError
 from crash_replay.shown_units import readable
 
 from .core.characteristic import characteristics
+from .core.derived_motion import with_accelerations
 from .core.diagnosis import Diagnosis, diagnose
 from .core.effects import EFFECTS
 from .core.effects.applied import applied
@@ -53,6 +54,7 @@ def write_report(
     The settings go to the methods that have them; seconds: after which the diagnosis tries nothing more; `told` hears of
     each part when it is done, and how long it took.
     """
+    structure, (recording,) = with_accelerations(structure, [recording])
     if not ((recording.time > 0.0) & (recording.time <= end)).any():
         raise ModelError(f"test {recording.test.id} has no samples between the impact and {end:g} s")
     step = partial(_timed, told)
@@ -66,7 +68,7 @@ def write_report(
             results[method] = estimated(method, settings=settings)
     best = methods[-1]
     with step("free run"):
-        runs_free = _free_run(structure, results[best], best, end, smooth, compared)
+        runs_free = _free_run(recording, structure, results[best], best, end, smooth, compared)
     with step("jumps"):
         jumps = _jumps(estimated("afmm", settings={}))
     masses = _masses(recording, structure, end)
@@ -173,11 +175,11 @@ def _cross(results: dict[str, Result]) -> Table:
 
 
 def _free_run(
-    structure: Structure, result: Result, method: str, end: float, smooth: Callable, compared: str
+    recording: Recording, structure: Structure, result: Result, method: str, end: float, smooth: Callable, compared: str
 ) -> list[Block]:
     """The best method's characteristics, simulated from the impact on (figures 4.16 to 4.19, 6.13, 6.14)."""
     description, estimates = result.description, result.estimates
-    simulated = free_run(structure, description, estimates, end=end)
+    simulated = free_run(structure, description, estimates, end=end, recording=recording)
     panels = []
     for k, (name, unit) in enumerate(zip(description.equations, description.equation_units)):
         shown, factor = readable(unit, simulated.measured[:, k])

@@ -82,7 +82,7 @@ def curves(layout: Layout, record: ObservedRecord, predicted: np.ndarray, effect
     return FitCurves(
         effects,
         tuple(o.channel if bodies.count(body) > 1 else body for o, body in zip(layout.outputs, bodies)),
-        tuple("N" if output.fixed else "m/s^2" for output in layout.outputs),
+        tuple(output.unit for output in layout.outputs),
         np.round(record.time[record.at] * 1e9).astype(np.int64),
         record.measured,
         predicted,
