@@ -112,7 +112,7 @@ def test_the_command_runs(tmp_path):
         done = subprocess.run([*command, *parts], capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
     rows = done.stdout.splitlines()[2:]
-    assert len(rows) == 4 and "bare relay" in rows[0] and " 0 lost" in rows[3], done.stdout
-    assert "by name" in rows[2] and "to blocks alone" in rows[2]
+    assert len(rows) == 5 and "bare relay" in rows[0] and " 0 lost" in rows[4], done.stdout
+    assert "a block of one" in rows[2] and "to blocks alone" in rows[3]
     assert " inf " not in done.stdout and " nan " not in done.stdout, "some samples had no answer"
     assert not list(tmp_path.iterdir())  # some of the rows make no page

@@ -13,6 +13,7 @@ from ..core.methods import make_estimator
 from ..model_file import load_model
 from .speed_graph import Graph, Pass, jitter, latencies
 from .speed_lockstep import burning, recorded, said
+from .speed_named import making
 from .speed_recordings import chain, ringing
 from .speed_row import Row, per_call
 
@@ -143,6 +144,7 @@ class Live:
         yield Row(what, *said, 1.0 - ratio(rounds, 1, 0), 0.05, least=False)
 
     def named(self) -> Iterator[Row]:
+        yield making(self.model, ringing(BODIES, 0.1))
         rounds, without, with_it = self._without_and_with("named", self.effort.singles, block=1)
         each = (1.0 / with_it - 1.0 / without) * 1e6
         what = "samples a second, single messages, while one Python node hears parameters and residuals by name as well"
