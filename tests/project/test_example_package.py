@@ -9,11 +9,15 @@ import sys
 import textwrap
 
 import pytest
+import rclpy
+from crash_msgs.msg import Parameter, Parameters
+from helpers_domain import own_domain
 from helpers_paths import ROOT
 from helpers_readme import EXAMPLE, README, environment
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
+from crash_examples.air_bag_trigger import AirBagTrigger
 from crash_examples.mass_spring_damper import MassSpringDamper
 from crash_examples.predictions import Prediction, told
 from crash_replay.synthetic.recordings import simulate_recording
@@ -63,6 +67,17 @@ def test_a_row_for_every_5_ms():
     rows = told(steps, 0.5, 0.08, None).splitlines()[1:]
     assert [float(row.split()[0]) for row in rows[1:-1]] == [5.0 * k for k in range(1, 14)]
     assert rows[-1] == "not fired"
+
+
+def test_an_element_that_there_is_not_is_said():
+    rclpy.init(domain_id=own_domain(), args=["--ros-args", "-p", "element:=spring"])
+    node = AirBagTrigger()
+    try:
+        with pytest.raises(SystemExit, match="no spring.stiffness among car_barrier.stiffness: -p element:=NAME"):
+            node.on_parameters(Parameters(time=0.01, parameters=[Parameter(name="car_barrier.stiffness")]))
+    finally:
+        node.destroy_node()
+        rclpy.shutdown()
 
 
 def test_the_code_that_is_shown_is_the_node_s():

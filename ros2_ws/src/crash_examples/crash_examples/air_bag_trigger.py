@@ -52,7 +52,9 @@ class AirBagTrigger(Node):
         if message.time <= 0.0 or self.v <= 0.0:  # before the impact, or after it
             return
         now = {p.name: p for p in message.parameters}
-        stiffness, damping = now[f"{self.element}.stiffness"], now.get(f"{self.element}.damping")
+        stiffness, damping = (now.get(f"{self.element}.{which}") for which in ("stiffness", "damping"))
+        if stiffness is None:
+            raise SystemExit(f"error: no {self.element}.stiffness among {', '.join(now)}: -p element:=NAME")
         car = MassSpringDamper(self.mass, stiffness.value, damping.value if damping else 0.0)
         self.x, self.v = car.after(self.x, self.v, message.time - self.time)
         self.time = message.time
