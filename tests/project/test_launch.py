@@ -137,7 +137,7 @@ def test_the_parameters_are_those_of_the_nodes(launched):
     nodes = launched(bag="b", model="m", diagnosis="true")
     assert set(vars(nodes["replay"])) - {"package"} <= set(PARAMETERS)
     for name in ("estimator", "diagnosis", "viewer"):
-        node = import_module(f"crash_estimator.nodes.{name}_node")
+        node = import_module(f"crash_estimator.nodes.{name}_parameters")
         assert set(vars(nodes[name])) - {"package"} <= set(node.PARAMETERS)
 
 

@@ -214,13 +214,6 @@ def test_it_says_who_is_missing(bag, listener):
     assert listener.messages == []
 
 
-def test_a_parameter_that_does_not_exist_is_not_passed_over_in_silence(bag):
-    with Replay(bag, rats=2.0) as replay:
-        status, _, errors = replay.end()
-    assert status == 0
-    assert errors.strip().endswith("there is no parameter rats: did you mean rate?") and errors.count("\n") == 1
-
-
 def test_a_subscriber_that_is_slow_loses_nothing(tmp_path):
     """At full speed it is left behind by more than the 5000 messages that it and the replay could hold."""
     n = 12_000

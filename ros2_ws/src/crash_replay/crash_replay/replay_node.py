@@ -10,7 +10,6 @@ from typing import Any
 
 import rclpy
 from crash_msgs.srv import Burst, Seek, SetRate, Step
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.exceptions import ParameterException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -23,17 +22,17 @@ from .console import Console, wanted
 from .fault import guarded, tell
 from .health import HealthReport
 from .middleware import prepare_middleware
-from .node_parameters import ParameterError, checked, declare_parameters, names_in
+from .node_parameters import declare_parameters, follow_changes, names_in
 from .pacing import Outcome, Pacing
 from .player import SECOND, CommandError, Player
 from .readers import read_source
 from .replay_health import replay_health
-from .replay_parameters import LIVE, PARAMETERS, window_of
+from .replay_parameters import PARAMETERS, window_of
 from .replay_topics import ReplayTopics
 from .ros_runtime import spin
 from .said import say
 from .samples_again import serve_samples
-from .selection import SelectionError, samples_within, select_channels
+from .selection import samples_within, select_channels
 
 
 class ReplayNode(Node):
@@ -41,7 +40,7 @@ class ReplayNode(Node):
 
     def __init__(self) -> None:
         super().__init__("replay", automatically_declare_parameters_from_overrides=True)
-        self.asked = declare_parameters(self, PARAMETERS, LIVE)
+        self.asked = declare_parameters(self, PARAMETERS)
         asked = self.asked
         recording = select_channels(read_source(asked["bag"]), names_in(asked["channels"]), names_in(asked["exclude"]))
         window = samples_within(window_of(asked), recording.time_ns)
@@ -58,7 +57,7 @@ class ReplayNode(Node):
         self.create_service(Burst, "~/burst", self._on_burst)
         serve_samples(self, recording)
         HealthReport(self, "pace", partial(replay_health, self.pacing, topics.audience))
-        self.add_on_set_parameters_callback(self._on_parameters)
+        follow_changes(self, PARAMETERS, self._change)
 
     def replay(self) -> Outcome:
         """All of it, in the calling thread."""
@@ -119,14 +118,10 @@ class ReplayNode(Node):
         response.message = f"rate {self.pacing.player.rate:g}" if result.successful else result.reason
         return response
 
-    def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Follow a change of what may be changed at any time; nothing of it where one part cannot be."""
-        try:
-            new = {p.name: checked(PARAMETERS, p.name, p.value) for p in parameters if p.name in LIVE}
-            asked = self.asked | new
-            window = samples_within(window_of(asked), self.pacing.player.time_ns)
-        except (ParameterError, SelectionError) as error:
-            return SetParametersResult(successful=False, reason=str(error))
+    def _change(self, new: dict[str, Any]) -> None:
+        """Raises SelectionError where the window has no sample."""
+        asked = self.asked | new
+        window = samples_within(window_of(asked), self.pacing.player.time_ns)
         self.asked = asked
         if "rate" in new:
             self.pacing.command(Player.set_rate, new["rate"])
@@ -134,7 +129,6 @@ class ReplayNode(Node):
             self.pacing.command(Player.set_loop, new["loop"])
         if new.keys() & {"from", "until"}:
             self.pacing.command(Player.set_window, *window)
-        return SetParametersResult(successful=True)
 
 
 def main() -> int:

@@ -8,9 +8,6 @@ from .player import HIGHEST_RATE, LOWEST_RATE
 from .selection import Window
 
 ON_A_TERMINAL = ("auto", "true", "false")
-LIVE = ("rate", "loop", "from", "until")
-"""Those that may be set at any time."""
-
 
 PARAMETERS = {
     "bag": Allowed(
@@ -18,12 +15,12 @@ PARAMETERS = {
         "the recording: a bag, a CSV with its YAML, an NHTSA EV5 or ISO-MME folder, nhtsa:NUMBER",
         needed="give a recording, --ros-args -p bag:=PATH",
     ),
-    "rate": Allowed(1.0, "times real time; may be set at any time", LOWEST_RATE, HIGHEST_RATE),
+    "rate": Allowed(1.0, "times real time", LOWEST_RATE, HIGHEST_RATE, live=True),
     "start_offset": Allowed(0.0, "s after the first sample at which to begin", 0.0, 1e6),
     "duration": Allowed(0.0, "s to play from there; 0: to the end", 0.0, 1e6),
-    "from": Allowed(-math.inf, "s since the impact, A of an A-B window; may be set at any time"),
-    "until": Allowed(math.inf, "s since the impact, B of an A-B window; may be set at any time"),
-    "loop": Allowed(False, "start again after the last sample, as a new run; may be set at any time"),
+    "from": Allowed(-math.inf, "s since the impact, A of an A-B window", live=True),
+    "until": Allowed(math.inf, "s since the impact, B of an A-B window", live=True),
+    "loop": Allowed(False, "start again after the last sample, as a new run", live=True),
     "channels": Allowed([""], "names of the channels to replay, or patterns such as rib_*; none: all"),
     "exclude": Allowed([""], "names or patterns of channels to leave out"),
     "delay": Allowed(0.0, "s to wait before the first sample, once the subscribers are there", 0.0, 3600.0),

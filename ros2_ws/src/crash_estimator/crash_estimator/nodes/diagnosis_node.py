@@ -7,6 +7,7 @@ a new revision of its model, and the same question is asked of it on the samples
 
 import sys
 from functools import partial
+from typing import Any
 
 from crash_msgs.msg import Samples, TestInfo
 from rclpy.node import Node
@@ -17,7 +18,7 @@ from crash_replay.bag import read_bag
 from crash_replay.complaints import Complaints
 from crash_replay.health import HealthReport
 from crash_replay.limits import most_samples
-from crash_replay.node_parameters import NAME, Allowed, declare_parameters, names_in
+from crash_replay.node_parameters import declare_parameters, follow_changes, names_in
 from crash_replay.qos import EVERY_SAMPLE, LATCHED
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import stamp, stamp_ns, test_from_msg
@@ -29,11 +30,12 @@ from ..core.effects.user import load_effects
 from ..core.kinematics import Kinematics
 from ..core.structure import ModelError, Structure
 from ..kept import Kept, Rows
-from ..model_file import MODEL, load_model
+from ..model_file import load_model
 from .asking import Asking
 from .catching_up import CatchingUp
 from .channel_feed import ChannelFeed
 from .diagnosis_messages import Moment
+from .diagnosis_parameters import PARAMETERS, Wanted
 from .diagnosis_telling import Telling
 from .diagnosis_worker import Task, Worker, WorkerError
 from .hearing import hear
@@ -48,24 +50,13 @@ TOLERATED = 0.01
 """Share of the samples so far that may be missing: the motion is integrated across small gaps only."""
 
 
-PARAMETERS = {
-    "model": Allowed("", MODEL, needed=f"give {MODEL}"),
-    "with_bags": Allowed([""], "other recordings of the same structure, used with the replayed one"),
-    "effects": Allowed("", "your own effects, a .py file; it is executed"),
-    "every": Allowed(0.002, "s of the crash between two rankings", 1e-5, 1e4),
-    "add_first": Allowed(False, "add the first effect that a final answer names, once; none where it is unexplained"),
-    "estimators": Allowed([""], "names of estimators that it is added to as well", pattern=NAME),
-    "replay": Allowed("replay", "node that samples are asked of which were missed", pattern=NAME),
-}
-
-
 class DiagnosisNode(Node):
     def __init__(self, **options) -> None:
         """options: of rclpy's Node. Raises ModelError, RecordingError or ParameterError with one line."""
         super().__init__("diagnosis", automatically_declare_parameters_from_overrides=True, **options)
         asked = declare_parameters(self, PARAMETERS)
         model, effects, replay = asked["model"], asked["effects"], asked["replay"]
-        self.adds, self.every_ns = asked["add_first"], round(asked["every"] * 1e9)
+        self.values, self.wanted, self.adds = asked, Wanted.from_values(asked), asked["add_first"]
         self.effects = EFFECTS | (load_effects(effects) if effects else {})
         structure = load_model(model, self.effects)
         self.bags = names_in(asked["with_bags"])
@@ -96,6 +87,7 @@ class DiagnosisNode(Node):
         hear(self, self.complaints, TestInfo, "test", self._on_test, LATCHED)
         hear(self, self.complaints, Samples, "samples", self._on_samples, EVERY_SAMPLE, received)
         self.create_timer(LOOK, self._look)
+        follow_changes(self, PARAMETERS, self._on_parameters)
         self.attending.tell()
 
     @property
@@ -224,8 +216,8 @@ class DiagnosisNode(Node):
 
     def _ask(self) -> None:
         time_ns = int(self.kept.time_ns[self.end - 1])
-        asked, complete = self.asked, self.end == self.total
-        new = asked is None or time_ns - asked.time_ns >= self.every_ns or (complete and asked.number < self.end - 1)
+        asked, complete, every = self.asked, self.end == self.total, self.wanted.every_ns
+        new = asked is None or time_ns - asked.time_ns >= every or (complete and asked.number < self.end - 1)
         if not (new or (complete and not asked.final)) or not self._has_enough():
             return
         at = stamp(self.time_zero + time_ns)
@@ -234,7 +226,8 @@ class DiagnosisNode(Node):
         if known:
             self._conclude(self.asked, known)
         else:
-            self.worker.ask(Task(self.structure, self.kept.until(self.end), self.asked.final))
+            recording, wanted = self.kept.until(self.end), self.wanted
+            self.worker.ask(Task(self.structure, recording, self.asked.final, wanted.tolerance, wanted.seconds))
 
     def _has_enough(self) -> bool:
         """Whether next to no sample is missing; asks for those that are."""
@@ -264,6 +257,14 @@ class DiagnosisNode(Node):
         if self.adds and answer.found and answer.verdict != UNEXPLAINED:
             self.adds = False
             self.model.add(answer.found[0])
+
+    def _on_parameters(self, new: dict[str, Any]) -> None:
+        """What may be left, or the time there is for it, is another: the question is asked once more."""
+        before, values = self.wanted, self.values | new
+        self.wanted, self.values = Wanted.from_values(values), values
+        if self.wanted._replace(every_ns=before.every_ns) != before:
+            self.finals.clear()
+            self._begin_anew()
 
     def _on_other_model(self) -> str:
         self._begin_anew()

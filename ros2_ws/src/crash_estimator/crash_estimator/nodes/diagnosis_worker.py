@@ -1,5 +1,6 @@
 """The diagnosis in a process of its own, so that the node's callbacks never wait for it. No ROS here."""
 
+import math
 import os
 import signal
 import subprocess
@@ -18,7 +19,7 @@ from crash_replay.recording import Channel, Recording, RecordingError, Test
 from crash_replay.starting import held
 
 from ..core.compile_cache import compiling_said
-from ..core.diagnosis import OnlineAnswer, OnlineDiagnosis, OnlineState, diagnose, final_answer
+from ..core.diagnosis import DEFAULT, OnlineAnswer, OnlineDiagnosis, OnlineState, Tolerance, diagnose, final_answer
 from ..core.effects import EFFECTS
 from ..core.effects.effect import Effect
 from ..core.effects.user import load_effects
@@ -35,6 +36,8 @@ class Task(NamedTuple):
     structure: Structure
     recording: Recording  # as far as the samples go
     final: bool  # that was the last one: the offline answer
+    tolerance: Tolerance = DEFAULT  # of the final answer: what is good enough
+    seconds: float = math.inf  # of the final answer: after which nothing more is tried
 
 
 class Answerer:
@@ -51,7 +54,8 @@ class Answerer:
         """None where the samples are too few. Raises ModelError or RecordingError."""
         structure, recording = task.structure, task.recording
         if task.final:
-            return final_answer(diagnose(structure, [recording, *self.others], self.effects))
+            found = diagnose(structure, [recording, *self.others], self.effects, task.tolerance, task.seconds)
+            return final_answer(found)
         live = self.live
         if live is None or live.structure != structure or live.test != recording.test or len(recording) < self.samples:
             live = OnlineDiagnosis(structure, recording.test, self.others, self.effects)

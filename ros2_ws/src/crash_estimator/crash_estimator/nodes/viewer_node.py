@@ -22,7 +22,7 @@ from crash_replay.attending import Attending, Progress
 from crash_replay.complaints import Complaints
 from crash_replay.foreign_text import visible
 from crash_replay.health import HealthReport
-from crash_replay.node_parameters import NAME, Allowed, declare_parameters, names_in
+from crash_replay.node_parameters import declare_parameters, names_in
 from crash_replay.output import check_outputs
 from crash_replay.qos import LATCHED, SAID, STREAM, UNACKNOWLEDGED
 from crash_replay.ros_messages import decoded, test_from_msg
@@ -38,6 +38,7 @@ from .hearing import hear
 from .node_health import viewer_health
 from .viewer_account import Account
 from .viewer_messages import BLOCK_OF, FINDING_OF, test_block
+from .viewer_parameters import PARAMETERS
 from .whole_estimates import WholeEstimates
 
 SETTLED = 0.3
@@ -45,21 +46,6 @@ SETTLED = 0.3
 
 HURRIED, PATIENT = 9.0, 60.0
 """s to end the file: where a signal has come before the end, who sent it waits not for long (`launch`: 10 s)."""
-
-
-PARAMETERS = {
-    "estimators": Allowed([""], "names of estimators; empty: all there are", pattern=NAME),
-    "models": Allowed([""], "files of models other than the ready ones, for the validation"),
-    "port": Allowed(9876, "of the gRPC server on 127.0.0.1 that viewers connect to; 0: a free one", 0, 65_535),
-    "rrd": Allowed("crash.rrd", "file that the recording is written to; empty: none"),
-    "memory_limit": Allowed(
-        "1GiB",
-        "what the server keeps for viewers that come late, such as 500MB or 10%",
-        pattern=r"\d{1,6}(%|[kMGT]i?B|B)",
-    ),
-    "open": Allowed(True, "open the native viewer where there is a display"),
-    "exit_when_finished": Allowed(False, "end with the replay"),
-}
 
 
 class ViewerNode(Node):
