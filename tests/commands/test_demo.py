@@ -91,7 +91,7 @@ def _curves_can_be_seen(rrd: Path) -> None:
     """The curves' own colours in the picture of the first tab: measured in the plots, both estimators as well."""
     from PIL import Image
 
-    from crash_estimator.viewer.cast import ESTIMATOR_COLORS, MEASURED
+    from crash_estimator.viewer.colors import ESTIMATOR_COLORS, MEASURED
     from crash_estimator.viewer.screenshot import ScreenshotError, screenshot
 
     png = rrd.with_suffix(".png")

@@ -18,8 +18,9 @@ from crash_estimator.model_file import load_model
 from crash_estimator.viewer import layout, validation
 from crash_estimator.viewer.blocks import Block, ForceBlock, ParameterBlock, ResidualBlock, join
 from crash_estimator.viewer.cast import Cast, member
+from crash_estimator.viewer.colors import CONFOUNDED, LIMIT_COLORS, TOLD, WEAK
 from crash_estimator.viewer.judged import Jury, describe, estimates_of, judge
-from crash_estimator.viewer.ranking import CONFOUNDED, LEFT, TOLD, WEAK, color_of, ranking_drawing, revision_color
+from crash_estimator.viewer.ranking import LEFT, color_of, ranking_drawing, revision_color
 from crash_estimator.viewer.revisions import LAGS, whiteness_drawing
 
 G = 9.80665
@@ -79,7 +80,8 @@ def with_weights(block: ParameterBlock) -> ParameterBlock:
 def rrd(crash, streams, structure, tmp_path_factory) -> Path:
     """Both estimators and a diagnosis."""
     path = tmp_path_factory.mktemp("missing") / "crash.rrd"
-    target = recorder(path, structure_of=lambda name: structure if name == structure.name else None, say=pytest.fail)
+    known = {structure.name: structure}
+    target = recorder(path, say=pytest.fail, structure_of=lambda estimator, revision, model: known.get(model))
     findings = story(crash)
     target.put(lambda: findings[0])  # before the first estimator is known
     feed(target, crash, streams)
@@ -220,10 +222,10 @@ class TestValidation:
         assert_allclose(judged.validation.covariance, expected.covariance)
         assert {e.equation for e in judged.validation.equations} == {"cab", "engine", "barrier"}
         assert judged.simulated is not None and len(judged.comparisons) == 5
-        jury = Jury(lambda name: structure)
+        jury = Jury(lambda estimator, revision, model: structure)
         for block in (b for stream in streams.values() for b in stream):
             jury.hear(block)
-        assert set(jury.verdicts()) == set(NAMES)
+        assert set(jury.verdicts(NAMES)) == set(NAMES)
         assert judge(load_model("frontal_single"), blocks) is None, "of another model"
 
     def test_tables_and_limits(self, cast, streams, structure):
@@ -233,7 +235,7 @@ class TestValidation:
         assert "auto-correlation: lags within 95% limits" in text and "ISO/TS 18571" in text
         cross = judged.validation.equations[0].cross["cab_barrier.crush"]
         drawing = validation.correlation_drawing(cast, {NAMES[0]: cross})
-        for level, color in zip((0.90, 0.95, 0.99), validation.LIMIT_COLORS):
+        for level, color in zip((0.90, 0.95, 0.99), LIMIT_COLORS):
             lines = [s for s, c in zip(drawing.strips, drawing.strip_colors) if c == color]
             drawn = sorted({round((-strip[0][1] - 0.45) / 0.45, 9) for strip in lines})
             limit = round(cross.limit(level), 9)

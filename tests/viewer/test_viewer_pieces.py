@@ -7,7 +7,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from crash_estimator.viewer import cast as cast_module
 from crash_estimator.viewer.axes import axis_for, round_up, text
 from crash_estimator.viewer.blocks import EventBlock, ForceBlock, ParameterBlock, ResidualBlock, join
-from crash_estimator.viewer.cast import ESTIMATOR_COLORS, Cast
+from crash_estimator.viewer.cast import Cast
+from crash_estimator.viewer.colors import ESTIMATOR_COLORS
 from crash_estimator.viewer.frames import FRAMES, frame_ends
 from crash_estimator.viewer.plausible import PARAMETER, PREDICTION, Limits
 from crash_estimator.viewer.schematic import schematic

@@ -12,8 +12,8 @@ import numpy as np
 from crash_replay.recording import Recording, Test
 
 from ...kinematics import Kinematics
+from ...sensor_noise import sensor_noise
 from ...structure import ModelError, Structure
-from .sensor_noise import sensor_noise
 
 LONGEST_STEP = 1.5e-4
 """s: the linear-acceleration step's phase error is (omega dt)^2 / 24: 2e-5 for the stiffest contact, 200 rad/s."""
