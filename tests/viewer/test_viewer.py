@@ -153,7 +153,7 @@ def test_the_file_ends_with_its_footer_and_its_layout_comes_before_the_data(rrd)
     assert rrd.read_bytes()[-12:-4] == b"RRF2FOOT"
     reader = RrdReader(rrd)  # warns, which is an error here, where there is no footer
     assert 1 <= len(reader.blueprints()) <= 5, "the first, where the figure needs more room, and with axes in the end"
-    assert rrd.stat().st_size < 4_000_000
+    assert rrd.stat().st_size < 5_000_000, "each layout takes a third of a MB"
 
 
 # What is on the picture
