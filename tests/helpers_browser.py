@@ -1,4 +1,4 @@
-"""A real browser without a window: Chromium through its WebDriver, where both are installed (Debian: chromium-driver)."""
+"""A browser without a window: Chromium through its WebDriver, where both are installed (on Debian: chromium-driver)."""
 
 import base64
 import io
@@ -6,6 +6,7 @@ import json
 import shutil
 import subprocess
 import time
+import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -64,7 +65,10 @@ class Browser:
         """The first picture that `shows` is true of and that stays as it is."""
         deadline, before = time.monotonic() + patience, None
         while time.monotonic() < deadline:
-            picture = self.picture()
+            try:
+                picture = self.picture()
+            except urllib.error.HTTPError:  # it has too much to do with drawing to give one
+                continue
             if before is not None and shows(picture) and np.array_equal(picture, before):
                 return picture
             before = picture

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
+from crash_msgs.msg import EstimatorState
 from crash_msgs.srv import GetEstimates
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -15,7 +16,7 @@ from rclpy.task import Future
 
 from crash_replay.attendance import GONE
 
-from .whole_estimates import LOOK, PATIENCE, STAYS, TOPICS, WholeEstimates
+from .whole_estimates import LOOK, PATIENCE, STAYS, TOPICS, WholeEstimates, about_of, revision_of
 
 
 class Wanted(NamedTuple):
@@ -40,6 +41,7 @@ class RevisedEstimates:
         self.call: Future | None = None
         self.asked = self.since = 0.0  # monotonic s: the last call, the first one that was not answered
         self.why_not = ""  # why a revision is not whole
+        self.of_before: EstimatorState | None = None  # what it told last on another test
         node.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def follow(self, whole: WholeEstimates) -> None:
@@ -48,9 +50,13 @@ class RevisedEstimates:
     def begin_test(self) -> None:
         self._end()
         self.revision, self.why_not = 0, ""
+        self.of_before = self.whole.states[-1] if self.whole and self.whole.states else None
 
     def take(self, topic: str, raw: bytes) -> None:
         """What the estimator publishes, in its order."""
+        if not self.wanted and (revision := revision_of(raw, TOPICS[topic])) > self.revision:
+            about = about_of(raw, TOPICS[topic])
+            self._want(revision, about.run, about.number)
         if self.wanted:
             self.held.append((topic, raw))
         else:
@@ -59,27 +65,29 @@ class RevisedEstimates:
     @property
     def settled(self) -> bool:
         """Whether every revision that is known of has been handed out, as far as it can be had."""
-        return self.wanted is None and (self.whole is None or self.whole.revision <= self.revision)
+        return self.wanted is None and self._news() is None
 
     def _look(self) -> None:
         now = time.monotonic()
-        if self.wanted is None and self.whole and self.whole.states:
-            self._begin()
+        if self.wanted is None and (state := self._news()):
+            self._want(state.revision, state.run, state.number)
         if self.wanted and self.call and now - self.asked > PATIENCE:
             self._forget()
         if self.wanted and not self.call:
             self._ask(now)
 
-    def _begin(self) -> None:
-        """What a new revision has said of the samples before it is wanted; a pass that began with it has them."""
-        state = self.whole.states[-1]
-        if state.revision == self.revision:
-            return
-        self.revision = state.revision
+    def _news(self) -> EstimatorState | None:
+        """What the estimator has told of a revision that has not been asked for, on this test."""
+        state = self.whole.states[-1] if self.whole and self.whole.states else None
+        return state if state and state is not self.of_before and state.revision > self.revision else None
+
+    def _want(self, revision: int, run: int, stop: int) -> None:
+        """What a new revision says of the samples before `stop`; a pass that began with it has none."""
+        self.revision = revision
         replay = self.whole.attending.replay_state
-        first = replay.first if replay and replay.run == state.run else 0
-        if first < state.number:
-            self.wanted, self.since = Wanted(state.revision, state.run, first, state.number), time.monotonic()
+        first = replay.first if replay and replay.run == run else 0
+        if first < stop:
+            self.wanted, self.since = Wanted(revision, run, first, stop), time.monotonic()
 
     def _ask(self, now: float) -> None:
         others = self.whole.attending.others

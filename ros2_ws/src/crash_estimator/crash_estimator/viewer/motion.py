@@ -25,7 +25,7 @@ from .plausible import Limits
 from .schematic import Schematic, schematic
 from .shapes import PITCH, REST, half_size, lane_height, row_y
 
-STEP = 0.25
+STEP = 0.5
 """Units of the drawing."""
 
 
