@@ -52,6 +52,14 @@ class Browser:
         self._chrome("Emulation.setDeviceMetricsOverride", metrics)
         self._call("POST", f"{self.session}/url", {"url": url})
 
+    def whole_page(self, height: int) -> list[np.ndarray]:
+        """Pictures of the open page from its top to its end."""
+        tall, pictures = self.run("return document.documentElement.scrollHeight"), []
+        for top in range(0, tall, height):
+            self.run(f"window.scrollTo(0, {top})")
+            pictures.append(self.picture())
+        return pictures
+
     def run(self, script: str):
         """What a script in the page returns."""
         return self._call("POST", f"{self.session}/execute/sync", {"script": script, "args": []})
@@ -63,9 +71,11 @@ class Browser:
 
     def settled_picture(self, shows, patience: float = DRAWING) -> np.ndarray:
         """The first picture that `shows` is true of and that stays as it is."""
-        deadline, before = time.monotonic() + patience, None
+        deadline, before, moved = time.monotonic() + patience, None, 0
         while time.monotonic() < deadline:
-            try:
+            moved += 1
+            try:  # without anything that happens a page without a window is not drawn anew
+                self._chrome("Input.dispatchMouseEvent", {"type": "mouseMoved", "x": 600 + moved % 9, "y": 50})
                 picture = self.picture()
             except urllib.error.HTTPError:  # it has too much to do with drawing to give one
                 continue

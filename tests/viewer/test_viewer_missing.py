@@ -7,7 +7,7 @@ import helpers_viewer as crash_data
 import numpy as np
 import pytest
 from helpers_findings import ADDED, candidate, ranking, revision, story
-from helpers_viewer import NAMES, column, feed, recorder, rows, series, settle, values_of
+from helpers_viewer import NAMES, column, feed, recorder, rows, series, settle, values_of, with_damping
 from numpy.testing import assert_allclose
 from rerun.blueprint.api import Container, View
 from rerun.chunk import RrdReader
@@ -48,18 +48,6 @@ def streams(crash) -> dict[str, list[Block]]:
         streams[name] = [with_damping(b) if isinstance(b, ParameterBlock) else b for b in streams[name]]
     streams[NAMES[0]] = [with_weights(b) if isinstance(b, ParameterBlock) else b for b in streams[NAMES[0]]]
     return streams
-
-
-def with_damping(block: ParameterBlock) -> ParameterBlock:
-    """None, which is known."""
-    none = np.zeros((len(block.time_ns), len(crash_data.ELEMENTS)))
-    return block._replace(
-        name=(*block.name, *(f"{element}.damping" for element in crash_data.ELEMENTS)),
-        unit=(*block.unit, *["N*s/m"] * len(crash_data.ELEMENTS)),
-        value=np.hstack([block.value, none]),
-        std=np.hstack([block.std, none]),
-        status=np.hstack([block.status, np.full(none.shape, ParameterStatus.KNOWN, np.uint8)]),
-    )
 
 
 def with_weights(block: ParameterBlock) -> ParameterBlock:

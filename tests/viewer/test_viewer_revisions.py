@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from helpers_findings import story
 from helpers_paths import ROOT
-from helpers_viewer import series, settle
+from helpers_viewer import series, settle, with_damping
 from numpy.testing import assert_allclose
 from PIL import Image
-from test_viewer_missing import with_damping
 
 from crash_estimator.core.structure import Structure
 from crash_estimator.model_file import load_model

@@ -26,8 +26,8 @@ FLOOR: Color = (165, 125, 0)
 LIMIT_COLORS: tuple[Color, ...] = ((135, 130, 95), (165, 125, 0), (215, 85, 60))
 """Of the 90, 95 and 99 % limits of a correlation."""
 
-INK: Color = (130, 130, 130)
-TITLE: Color = (130, 130, 130)
+INK: Color = (120, 120, 120)
+TITLE: Color = (120, 120, 120)
 GRID = (128, 128, 128, 80)
 """Translucent, so that it does not disturb."""
 
