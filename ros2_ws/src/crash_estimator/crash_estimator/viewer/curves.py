@@ -81,9 +81,12 @@ def residual_views(cast: Cast, kind: str = "residual") -> list[rrb.View]:
     """kind: `residual` (after the update) or `innovation` (before it)."""
     other = SO_FAR if cast.whole else WHOLE
     return [
-        _plot(path(kind, body), f"{body}: {kind}, with the noise's 99 % band, {cast.shown(unit).unit}", hidden=other)
+        _plot(
+            path(kind, body), f"{body}: {kind}, with the noise's 99 % band, {cast.shown(unit).unit}",
+            rrb.Corner2D.LeftTop, hidden=other,
+        )
         for body, unit in cast.equations
-    ]
+    ]  # fmt: skip
 
 
 def parameter_views(cast: Cast) -> list[rrb.View]:
@@ -99,6 +102,12 @@ def quiet_corner(cast: Cast, body: str) -> rrb.Corner2D:
     """A corner for the legend that the curve leaves free: what strikes slows down, what is struck is pushed forward."""
     pushed = {b for m in cast.members for _, b in m.between}
     return rrb.Corner2D.RightTop if body in pushed else rrb.Corner2D.RightBottom
+
+
+def early_corner(cast: Cast, body: str) -> rrb.Corner2D:
+    """At the left, where the curve still is near zero."""
+    pushed = quiet_corner(cast, body) == rrb.Corner2D.RightTop
+    return rrb.Corner2D.LeftTop if pushed else rrb.Corner2D.LeftBottom
 
 
 def _plot(origin: str, name: str, corner: rrb.Corner2D = rrb.Corner2D.RightTop, hidden: str = "") -> rrb.View:

@@ -13,6 +13,7 @@ from ..validation_tables import strongest_input
 from .axes import Axis
 from .cast import Cast
 from .colors import INK, LIMIT_COLORS, MEASURED
+from .curves import early_corner
 from .drawing import Drawing, Frame, view
 from .judged import Judged
 from .pen import TIMELINE, Look, Pen, own_path, path
@@ -137,7 +138,7 @@ def validation_tab(cast: Cast) -> rrb.Container:
     free_runs = [
         rrb.TimeSeriesView(
             origin=path("free_run", body), name=f"{body}: simulated freely, {cast.shown(unit).unit}",
-            axis_x=rrb.TimeAxis(link="LinkToGlobal"), plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+            axis_x=rrb.TimeAxis(link="LinkToGlobal"), plot_legend=rrb.PlotLegend(early_corner(cast, body)),
         )
         for body, unit in bodies
     ]  # fmt: skip
