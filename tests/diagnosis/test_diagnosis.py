@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from crash_estimator.core.diagnosis.observation.record import observe
-from crash_estimator.core.diagnosis.observation.sensor_noise import sensor_noise
+from crash_estimator.core.sensor_noise import sensor_noise
 from crash_estimator.core.diagnosis.output_error.normal_equations import may_diverge
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 from crash_estimator.core.diagnosis.report.diagnosis import Diagnosis, diagnose

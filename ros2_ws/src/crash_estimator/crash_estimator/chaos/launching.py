@@ -17,11 +17,11 @@ from types import SimpleNamespace
 from ament_index_python.packages import get_package_share_directory
 
 from crash_replay.fault import guarded, tell
+from crash_replay.processes import end_with
 from crash_replay.recording import RecordingError
 from crash_replay.said import say
 from crash_replay.starting import held
 
-from ..demo.children import end_with
 from .launch_words import LaunchContext, Node, RegisterEventHandler, arguments_of, described, started
 from .members import node_command, send
 

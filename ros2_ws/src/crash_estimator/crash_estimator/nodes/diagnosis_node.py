@@ -190,7 +190,7 @@ class DiagnosisNode(Node):
         missing = self.kept.missing(self.end)
         final = self.asked is not None and self.asked.final and not self.worker.busy
         why = self.stopped or (self.cannot_be_had if missing or self.end < self.total else "")
-        done = final or bool(self.stopped)
+        done = (final or bool(self.stopped)) and self.model.complete
         return Progress(self.run if self.run >= 0 else 0, self.total, self.end, missing, done, why, self.prepared)
 
     # what is asked and said

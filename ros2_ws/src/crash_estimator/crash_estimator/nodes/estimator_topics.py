@@ -17,6 +17,7 @@ from crash_replay.subscribers import waited_for
 
 from ..core.estimate import Description
 from ..following.columns import Columns
+from .effect_requests import model_effect
 from .estimate_messages import FIELDS, EstimateMessages
 from .estimator_model import EstimatorModel
 from .later import LOOK, Later
@@ -94,6 +95,7 @@ class EstimatorTopics:
     def tell_state(self, model: EstimatorModel, run: int, number: int, stamp_ns: int, **counts: int) -> None:
         """counts: the other numbers of an EstimatorState, by their fields."""
         names = {"model": model.structure.name, "method": model.method, "effects": model.effects()}
+        names["model_effects"] = [model_effect(spec) for spec in model.structure.effects]
         message = EstimatorState(run=run, number=number, revision=model.revision, **names, **counts)
         message.header.stamp, message.header.frame_id = stamp(stamp_ns), message.model
         self.state.publish(message)

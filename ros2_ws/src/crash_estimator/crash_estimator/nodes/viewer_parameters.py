@@ -13,5 +13,7 @@ PARAMETERS = {
         pattern=r"\d{1,6}(%|[kMGT]i?B|B)",
     ),
     "open": Allowed(True, "open the native viewer where there is a display"),
+    "web": Allowed(False, "where there is no display, serve Rerun's web viewer on 127.0.0.1"),
+    "web_port": Allowed(9090, "of the web viewer; 0, or one in use: a free one is taken", 0, 65_535),
     "exit_when_finished": Allowed(False, "end with the replay"),
 }

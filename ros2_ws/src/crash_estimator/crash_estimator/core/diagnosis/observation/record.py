@@ -15,9 +15,9 @@ from crash_replay.recording import SI_UNIT, Recording, Test
 
 from ...derived_motion import between_samples, smoothed
 from ...kinematics import Kinematics
+from ...sensor_noise import sensor_noise
 from ...structure import ModelError, Structure
 from .pace import longest_step
-from .sensor_noise import sensor_noise
 from .tracked_motion import tracked_acceleration
 
 BIN = 4e-4
