@@ -104,7 +104,9 @@ def test_it_records_the_topics_that_are_asked_for(bag, tmp_path):
     with Record(file, **chosen) as record, Replay(bag, rate=0.05, wait_for=1, wait_timeout=PATIENCE) as replay:
         assert replay.end()[0] == 0
         assert record.end()[0] == 0
-    assert messages(file) == {"/test": 1, "/samples": 40, "/channels/rib_ay": 40, "/clock": 40}
+    found = messages(file)
+    assert found.pop("/clock") >= 40
+    assert found == {"/test": 1, "/samples": 40, "/channels/rib_ay": 40}
 
 
 def test_what_was_not_replayed_is_missing_and_the_status_says_so(bag, tmp_path):

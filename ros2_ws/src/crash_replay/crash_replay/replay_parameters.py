@@ -38,7 +38,9 @@ PARAMETERS = {
     "finish_timeout": Allowed(
         300.0, "s after the last sample for nodes that take part to get what they lack", 0.0, 1e5
     ),
-    "clock": Allowed(True, "publish /clock with each message on samples"),
+    "clock": Allowed(
+        "auto", "publish /clock; auto: outside a namespace, where nobody else does", choices=("auto", "true", "false")
+    ),
     "progress": Allowed("auto", "keep a progress line; auto: on a terminal", choices=ON_A_TERMINAL),
     "keyboard": Allowed("auto", "take keys, h lists them; auto: on a terminal", choices=ON_A_TERMINAL),
 }

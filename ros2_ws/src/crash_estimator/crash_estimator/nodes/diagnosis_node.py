@@ -55,7 +55,7 @@ PARAMETERS = {
     "every": Allowed(0.002, "s of the crash between two rankings", 1e-5, 1e4),
     "add_first": Allowed(False, "add the first effect that a final answer names, once; none where it is unexplained"),
     "estimators": Allowed([""], "names of estimators that it is added to as well", pattern=NAME),
-    "replay": Allowed("replay", "node that samples are asked of which were missed", pattern=NAME),
+    "replay": Allowed("", "node that samples are asked of which were missed; empty: the replay there is", pattern=NAME),
 }
 
 
@@ -89,7 +89,7 @@ class DiagnosisNode(Node):
         others = names_in(asked["estimators"])
         self.model = ModelRevisions(self, structure, self.effects, others, test, self._on_other_model)
         self.attending = Attending(self, "diagnosis", self._progress)
-        self.asking = Asking(self, f"{replay}/get_samples", self.attending, self._on_samples_again, self._fitting)
+        self.asking = Asking(self, replay, self.attending, self._on_samples_again, self._fitting)
         self.catching_up = CatchingUp(self, self.attending, self._place, self._ask_for_rest)
         self.feed = ChannelFeed(self, "samples", self._on_feed_begins, self._on_feed)
         HealthReport(self, "answers", partial(diagnosis_health, self))

@@ -52,7 +52,7 @@ PARAMETERS = {
     "effects": Allowed("", "your own effects, a .py file; it is executed"),
     "effective_mass": Allowed(False, "find the masses that go with the accelerometers first"),
     "value_topics": Allowed([""], "parameters that get a topic of their own, names or patterns such as *.stiffness"),
-    "replay": Allowed("replay", "node that samples are asked of which were missed", pattern=NAME),
+    "replay": Allowed("", "node that samples are asked of which were missed; empty: the replay there is", pattern=NAME),
 }
 
 
@@ -75,7 +75,7 @@ class EstimatorNode(Node):
         self.topics = EstimatorTopics(self, value_topics)
         self.again = EstimatesAgain(self)
         self.attending = Attending(self, "estimator", self._progress)
-        self.intake = Intake(self, f"{replay}/get_samples", self.attending, self)
+        self.intake = Intake(self, replay, self.attending, self)
         HealthReport(self, "filter", partial(estimator_health, self))
         self.create_service(Trigger, "~/reset", self._on_reset)
         self.create_service(AddEffect, "~/add_effect", self._on_add_effect)

@@ -22,6 +22,7 @@ from crash_replay.attending import Attending, Progress
 from crash_replay.complaints import Complaints
 from crash_replay.foreign_text import visible
 from crash_replay.health import HealthReport
+from crash_replay.namespaces import is_own
 from crash_replay.node_parameters import NAME, Allowed, declare_parameters, names_in
 from crash_replay.output import check_outputs
 from crash_replay.qos import LATCHED, SAID, STREAM, UNACKNOWLEDGED
@@ -48,7 +49,7 @@ HURRIED, PATIENT = 9.0, 60.0
 
 
 PARAMETERS = {
-    "estimators": Allowed([""], "names of estimators; empty: all there are", pattern=NAME),
+    "estimators": Allowed([""], "names of estimators; empty: all in its namespace", pattern=NAME),
     "models": Allowed([""], "files of models other than the ready ones, for the validation"),
     "port": Allowed(9876, "of the gRPC server on 127.0.0.1 that viewers connect to; 0: a free one", 0, 65_535),
     "rrd": Allowed("crash.rrd", "file that the recording is written to; empty: none"),
@@ -165,8 +166,8 @@ class ViewerNode(Node):
     def _estimators_around(self) -> set[str]:
         own = self.get_namespace().rstrip("/") + "/"
         kind, last = "crash_msgs/msg/ResidualsBlock", "/block/residuals"
-        topics = [topic for topic, kinds in self.get_topic_names_and_types() if kind in kinds]
-        return {topic.removeprefix(own).removesuffix(last) for topic in topics if topic.endswith(last)}
+        topics = [topic for topic, kinds in self.get_topic_names_and_types() if kind in kinds and topic.endswith(last)]
+        return {topic.removeprefix(own).removesuffix(last) for topic in topics if is_own(self, topic)}
 
     def _be_counted(self) -> None:
         """Subscribe to `samples` once all estimators can be heard, until the first sample.
