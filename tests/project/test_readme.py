@@ -16,6 +16,7 @@ LISTENING = [c for c in COMMANDS if any(node in c for node in NODES)]
 REPLAY = [c for c in COMMANDS if "crash_replay replay" in c]
 THREE = [c for c in COMMANDS if "hidden_effect" in c and "--effects" not in c]
 MAKE = [c for c in COMMANDS if c.startswith("make ")]  # test_readme_demo, and this
+NAMESPACED = [line.strip() for line in README.splitlines() if line.startswith("    tools/run") and "__ns:=" in line]
 ALONE = [c for c in COMMANDS if c not in (*MAKE, *LISTENING, *REPLAY, *THREE)]
 
 
@@ -70,6 +71,30 @@ def test_the_nodes_find_each_other(tmp_path):
         assert "Traceback" not in text and "not seen" not in text, text
     assert statuses == [0, 0, 0]
     assert all(file.stat().st_size > 100_000 for file in written)
+
+
+def test_sleds_in_namespaces_are_replayed_side_by_side():
+    estimators = [c for c in NAMESPACED if "crash_estimator estimator" in c]
+    replays = [f"{c} -p wait_timeout:=120.0" for c in NAMESPACED if "crash_replay replay" in c]
+    assert len(estimators) == len(replays) == 2
+    piped = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    together = {"cwd": ROOT, "env": environment(), **piped}
+    nodes = {c: subprocess.Popen(shlex.split(c), **together) for c in (*estimators, *replays)}
+    said = {c: nodes[c].communicate(timeout=200)[0] for c in replays}
+    for c in estimators:
+        nodes[c].terminate()
+    said |= {c: nodes[c].communicate(timeout=60)[0] for c in estimators}
+    assert all(node.returncode == 0 for node in nodes.values()), said
+    assert ["1201 samples sent" in said[replays[0]], "1901 samples sent" in said[replays[1]]] == [True, True], said
+
+
+def test_the_composed_form_replays_to_both_its_estimators():
+    (command,) = [line.strip() for line in README.splitlines() if "crash_estimator composed kalman" in line]
+    wait = " -p replay:wait_timeout:=120.0"
+    ends = {"capture_output": True, "text": True, "timeout": 200}
+    done = subprocess.run(shlex.split(command + wait), cwd=ROOT, env=environment(), **ends)
+    assert (done.returncode, "1201 samples sent" in done.stdout) == (0, True), done.stdout + done.stderr
+    assert all(f"[{name}]: test side_dummy_padded" in done.stdout + done.stderr for name in ("kalman", "quick"))
 
 
 @pytest.mark.parametrize("name", sorted(set(re.findall(r"`(ros2_ws/src/[\w/]+|bags/[\w.]+)`", README))))

@@ -3,7 +3,7 @@
 import math
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from threading import Thread
 from typing import Any
@@ -39,8 +39,9 @@ from .selection import SelectionError, samples_within, select_channels
 class ReplayNode(Node):
     """The replay's parameters, topics and services; `pacing` does what they ask for."""
 
-    def __init__(self) -> None:
-        super().__init__("replay", automatically_declare_parameters_from_overrides=True)
+    def __init__(self, **options) -> None:
+        """options: of rclpy's Node."""
+        super().__init__("replay", automatically_declare_parameters_from_overrides=True, **options)
         self.asked = declare_parameters(self, PARAMETERS, LIVE)
         asked = self.asked
         recording = select_channels(read_source(asked["bag"]), names_in(asked["channels"]), names_in(asked["exclude"]))
@@ -138,22 +139,34 @@ class ReplayNode(Node):
 
 
 def main() -> int:
-    return guarded(_main, also=(ParameterException,))
+    return guarded(replay_beside, also=(ParameterException,))
 
 
-def _main() -> int:
+def replay_beside(
+    make_others: Callable[[], Sequence[Node]] = tuple,
+    make: Callable[[], ReplayNode] = ReplayNode,
+    hear_out: Callable[[ReplayNode, Sequence[Node]], int] = lambda node, others: 0,
+    arguments: Sequence[str] | None = None,
+) -> int:
+    """A replay, with other nodes in the same process, till it is over -> exit status.
+
+    hear_out: what the others still have to do when the replay has gone, and the exit status for it; arguments: for all
+    nodes, where it is not the command line.
+    """
     prepare_middleware()
     # Ctrl-C must end the replay between two messages, not take the context away under it.
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node = ReplayNode()
+        others = make_others()
+        node = make()
     except BaseException:
         rclpy.shutdown()
         raise
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: setattr(node.pacing, "stopped", True))
     executor, done = EventsExecutor(), Future()
-    executor.add_node(node)
+    for one in (node, *others):
+        executor.add_node(one)
     services = Thread(target=spin, args=(executor, done))
     services.start()
     try:
@@ -161,14 +174,16 @@ def _main() -> int:
         say(outcome.text)
         for line in outcome.lacking:
             tell(f"incomplete: {line}")
-        return 1 if outcome.lacking else 0
+        node.topics.audience.leave()
+        return max(1 if outcome.lacking else 0, hear_out(node, others))
     finally:
         node.topics.audience.leave()
         done.set_result(None)
         executor.wake()
         services.join()
         executor.shutdown()
-        node.destroy_node()
+        for one in (node, *others):
+            one.destroy_node()
         rclpy.shutdown()
 
 
