@@ -53,9 +53,11 @@ class Replay:
 
     def __init__(self, bag=None, remap: Sequence[str] = (), **parameters):
         """remap: such as __ns:=/sled_a."""
-        command = [sys.executable, "-m", "crash_replay.replay_node", "--ros-args", *(w for r in remap for w in ("-r", r))]
+        command = [sys.executable, "-m", "crash_replay.replay_node", "--ros-args"]
+        command += [word for rule in remap for word in ("-r", rule)]
         for name, value in {**({"bag": bag} if bag else {}), **parameters}.items():
-            command += ["-p", f"{name}:={str(value).lower() if isinstance(value, bool) else value}"]
+            shown = [str(one) for one in value] if isinstance(value, list) else value
+            command += ["-p", f"{name}:={str(shown).lower() if isinstance(shown, bool) else shown}"]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
         self.process = subprocess.Popen(command, env=environment(), text=True, **pipes)
 

@@ -157,3 +157,13 @@ def test_a_replay_of_another_name_is_asked_by_its_own(stage, recording, whole):
     assert again.success
     assert_exact([again.parameters], whole["mrls"])
     assert_exact(said(), whole["mrls"])
+
+
+def test_several_recordings_in_turn_are_each_estimated_from_the_start(stage, recording, whole):
+    stage.add_estimator("mrls", model=MODEL, method="mrls")
+    stage.start("crash_replay.replay_node", bag=BAG, then=f"[{BAG}]", rate=2.0, listeners="[mrls]", wait_timeout=100.0)
+    said = stage.heard["mrls"]["parameters"]
+    twice = list(range(len(recording))) * 2
+    stage.spin_until(lambda: len(numbers(said)) == len(twice), "both are estimated")
+    assert numbers(said) == twice
+    assert_exact(said, whole["mrls"])

@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import shutil
 import subprocess
 
 import numpy as np
@@ -10,6 +11,12 @@ import pytest
 from helpers_paths import ROOT
 from helpers_readme import COMMANDS, README, environment, needs_data
 from numpy.testing import assert_allclose
+from rclpy.serialization import serialize_message
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from crash_replay.bag import read_bag, time_zero_ns
+from crash_replay.message_types import encode_test, typestore
+from crash_replay.ros_messages import samples_to_msg
 
 NODES = ("crash_estimator viewer", "crash_estimator estimator", "crash_replay record")
 LISTENING = [c for c in COMMANDS if any(node in c for node in NODES)]
@@ -95,6 +102,23 @@ def test_the_composed_form_replays_to_both_its_estimators():
     done = subprocess.run(shlex.split(command + wait), cwd=ROOT, env=environment(), **ends)
     assert (done.returncode, "1201 samples sent" in done.stdout) == (0, True), done.stdout + done.stderr
     assert all(f"[{name}]: test side_dummy_padded" in done.stdout + done.stderr for name in ("kalman", "quick"))
+
+
+def test_what_rosbag2_has_recorded_of_test_and_samples_is_replayed():
+    (command,) = [line.strip() for line in README.splitlines() if "bag:=out/rosbag2" in line]
+    recording, folder = read_bag(ROOT / "bags/frontal_engine_cab.mcap"), ROOT / "out/rosbag2"
+    shutil.rmtree(folder, ignore_errors=True)
+    zero = time_zero_ns(recording)
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topics = {"/test": "crash_msgs/msg/TestInfo", "/samples": "crash_msgs/msg/Samples"}
+        test, samples = (writer.add_connection(t, kind, typestore=typestore()) for t, kind in topics.items())
+        writer.write(test, zero, encode_test(recording, zero))
+        for number in range(len(recording)):
+            message = samples_to_msg(recording, number, number + 1, 0, zero)
+            writer.write(samples, zero + recording.time_ns.item(number), serialize_message(message))
+    ends = {"capture_output": True, "text": True, "timeout": 100}
+    done = subprocess.run(shlex.split(command), cwd=ROOT, env=environment(), **ends)
+    assert done.returncode == 0 and f"{len(recording)} samples sent" in done.stdout, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("name", sorted(set(re.findall(r"`(ros2_ws/src/[\w/]+|bags/[\w.]+)`", README))))

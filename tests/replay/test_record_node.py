@@ -53,6 +53,7 @@ def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path, monkeypatch,
         (["to:=e.mcap", "wait_for:=-1"], "wait_for"),
         (["to:=e.bag"], "must be a file that ends in .mcap, got 'e.bag'"),
         (["to:=e.mcap", "topics:=5"], "parameter topics must be a list of names, got 5"),
+        (["to:=e.mcap", "regex:='('"], "parameter regex must be a regular expression, got '('"),
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(tmp_path, parameters, said):

@@ -33,6 +33,7 @@ from .recorded_topics import DIAGNOSTICS, NUMBERED, Choice, about, unreadable
 from .recorder import Heard, Recorder
 from .ros_runtime import run
 from .said import say
+from .selection import regular_expression
 
 LOOK = 0.1
 """s between two looks for new topics, and for the end."""
@@ -50,6 +51,8 @@ PARAMETERS = {
     "wait_for": Allowed(1, "estimators to hear before the samples", 0, 1000),
     "topics": Allowed([""], "names or patterns such as kalman/*; without any: its namespace but channels and clock"),
     "exclude": Allowed([""], "topics to leave out, names or patterns"),
+    "regex": Allowed("", "regular expression: topics of its namespace in whose name it is found, too"),
+    "exclude_regex": Allowed("", "regular expression of topics to leave out"),
 }
 
 
@@ -63,7 +66,10 @@ class RecordNode(Node):
     def __init__(self) -> None:
         super().__init__("record", automatically_declare_parameters_from_overrides=True)
         asked = declare_parameters(self, PARAMETERS)
-        choice = Choice(names_in(asked["topics"]), names_in(asked["exclude"]), self.get_namespace())
+        for name in ("regex", "exclude_regex"):
+            regular_expression(asked[name], name)
+        lists = names_in(asked["topics"]), names_in(asked["exclude"])
+        choice = Choice(*lists, self.get_namespace(), asked["regex"], asked["exclude_regex"])
         self.recorder = opened(asked["to"])
         self.attending = Attending(self, "record", self._progress)
         self.account = Completeness(choice, self.attending.others, self.resolve_topic_name("samples"))

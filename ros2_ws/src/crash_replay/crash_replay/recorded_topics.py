@@ -1,5 +1,6 @@
 """Which topics `record` writes, and what it can tell of their messages without making objects of them."""
 
+import re
 import struct
 from collections.abc import Iterable, Sequence
 from fnmatch import fnmatchcase
@@ -36,16 +37,18 @@ class Choice(NamedTuple):
     topics: Sequence[str] = ()  # none: all but those that hold what `samples` and the blocks hold as well
     exclude: Sequence[str] = ()
     namespace: str = "/"
+    regex: str = ""  # regular expressions, searched for in a topic's full name
+    exclude_regex: str = ""
 
     def wants(self, name: str, kind: str, own: bool = True) -> bool:
         """own: whether the topic is of the recorder's namespace; of another one it has to be asked for in full."""
         if kind not in STAMPED | WITHOUT_STAMP or (kind in CHANNELS and "/channels/" not in name):
             return False
-        if not own:
-            chosen = self.fits(name, [pattern for pattern in self.topics if pattern.startswith("/")])
-        else:
-            chosen = self.fits(name, self.topics) if self.topics else kind not in CHANNELS | NAMED | {CLOCK}
-        return chosen and not self.fits(name, self.exclude)
+        topics = [pattern for pattern in self.topics if own or pattern.startswith("/")]
+        chosen = self.fits(name, topics) or (own and _found(self.regex, name))
+        if own and not (self.topics or self.regex):
+            chosen = kind not in CHANNELS | NAMED | {CLOCK}
+        return chosen and not (self.fits(name, self.exclude) or _found(self.exclude_regex, name))
 
     def in_vain(self, names: Iterable[str]) -> list[str]:
         """Those of `topics` that no recorded topic fits."""
@@ -55,6 +58,10 @@ class Choice(NamedTuple):
     def fits(self, name: str, patterns: Sequence[str]) -> bool:
         relative = name.removeprefix(f"{self.namespace.rstrip('/')}/")
         return any(fnmatchcase(name, pattern) or fnmatchcase(relative, pattern) for pattern in patterns)
+
+
+def _found(regex: str, name: str) -> bool:
+    return bool(regex) and re.search(regex, name) is not None
 
 
 def stamp_of(data: bytes) -> int:

@@ -2,9 +2,9 @@
 
     tools/run crash_estimator composed NAME [NAME ...] --ros-args -p replay:bag:=BAG -p NAME:model:=MODEL
 
-Each node has its parameters behind its name and a colon, whatever its namespace. It is one process to start, watch and end instead of several;
-what its nodes say goes through the middleware all the same, and one thread computes at a time. It ends when the replay is
-over and everybody has said the last word.
+Each node has its parameters behind its name and a colon, whatever its namespace. It is one process to start, watch and
+end instead of several; what its nodes say goes through the middleware all the same, and one thread computes at a time.
+It ends when the replay is over and everybody has said the last word.
 """
 
 import json
@@ -59,6 +59,13 @@ def names_in(words: Sequence[str]) -> list[str]:
     return names
 
 
+def replay_once(words: Sequence[str]) -> ReplayNode:
+    node = ReplayNode(cli_args=words)
+    if node.then:
+        raise Usage("parameter then: the composed form replays one recording; take `replay` for several")
+    return node
+
+
 def hear_out(replay: ReplayNode, estimators: Sequence[EstimatorNode]) -> int:
     """Stay till nobody wants anything more of the estimators -> exit status."""
     others, limit = replay.topics.audience.attending.others, time.monotonic() + replay.asked["finish_timeout"]
@@ -81,7 +88,7 @@ def _main() -> int:
     first = [sys.argv[0], "--ros-args", "-p", f"replay:listeners:={json.dumps(names)}", "--"]
     shared, own = shared_out([*first, *sys.argv[1:]], ["replay", *names])
     estimators = lambda: [EstimatorNode(cli_args=own[name]) for name in names]  # noqa: E731
-    return replay_beside(estimators, partial(ReplayNode, cli_args=own["replay"]), hear_out, shared)
+    return replay_beside(estimators, partial(replay_once, own["replay"]), hear_out, shared)
 
 
 if __name__ == "__main__":
