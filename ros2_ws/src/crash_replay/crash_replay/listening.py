@@ -27,7 +27,7 @@ class Listening:
         """What has been found since the last look; a replay that waits for this node begins when all is heard."""
         found = []
         for name, (kind, *_) in self.node.get_topic_names_and_types():
-            if name in self.heard or not self.node.count_publishers(name):
+            if name in self.heard or not self.choice.wants(name, kind) or not self.node.count_publishers(name):
                 continue
             own = is_own(self.node, name)
             if self.choice.wants(name, kind, own) and (kind != SAMPLES or self.settled()):
