@@ -62,7 +62,7 @@ def test_replay_estimator_and_viewer_are_started_with_what_was_given(launched):
     assert (replay.bag, replay.rate, type(replay.rate), replay.clock) == ("a/1234", 1.0, float, "auto")
     assert (estimator.model, estimator.method) == ("side_dummy", "constrained_kalman")
     assert estimator.settings == ["forgetting=0.9", "m=4"]
-    assert estimator.method in METHODS and viewer.rrd.endswith(".rrd") and viewer.port == 0
+    assert estimator.method in METHODS and (viewer.rrd, viewer.port) == ("crash.rrd", 0)
 
 
 def test_the_replay_waits_for_all_that_are_started(launched):
@@ -97,6 +97,11 @@ def test_all_are_in_the_namespace_and_read_the_file_of_parameters_last(launched)
     assert {one.node.namespace for one in nodes.values()} == {"/sled_a"}
     assert all(one.node.ros_arguments[-2:] == ["--params-file", "my.yaml"] for one in nodes.values())
     assert all("--params-file" not in one.node.ros_arguments for one in launched().values())
+
+
+def test_two_sleds_do_not_write_one_file(launched):
+    assert launched(namespace="/lab/sled_a")["viewer"].rrd == "lab-sled_a.rrd"
+    assert launched(namespace="sled_a", rrd="mine.rrd")["viewer"].rrd == "mine.rrd"
 
 
 def test_composed_replay_and_estimators_are_one_process_with_the_same_parameters(launched):

@@ -36,7 +36,7 @@ ARGUMENTS = {  # name: (default or None, meaning)
     "diagnosis": ("false", "say which physical effect the model lacks (true: it is published as the samples come)"),
     "viewer": ("true", "show it in Rerun (false: estimate only)"),
     "port": ("9876", "where viewers connect to on 127.0.0.1"),
-    "rrd": ("crash.rrd", "file that the viewer writes"),
+    "rrd": ("auto", "file that the viewer writes (empty: none; auto: crash.rrd, or NAMESPACE.rrd in a namespace)"),
     "exit_when_finished": ("false", "end with replay, viewer and record; viewer or record hear the diagnosis out"),
 }
 ON = ("true", "1")
@@ -88,7 +88,9 @@ def nodes(given: Given) -> dict[str, Node]:
         found = {"replay": node(given, "crash_replay", "replay", "replay", parameter_words(replay))}
         for name, values in estimators.items():
             found[name] = node(given, "crash_estimator", "estimator", name, parameter_words(values))
-    shown = {"rrd": given["rrd"], "port": int(number(given, "port")), "exit_when_finished": exits(given)}
+    auto = f"{given['namespace'].strip('/').replace('/', '-') or 'crash'}.rrd"
+    rrd = auto if given["rrd"] == "auto" else given["rrd"]
+    shown = {"rrd": rrd, "port": int(number(given, "port")), "exit_when_finished": exits(given)}
     of_besides = {
         "viewer": ("crash_estimator", shown),
         "diagnosis": ("crash_estimator", {"model": given["model"]}),
