@@ -38,6 +38,7 @@ class Heard(NamedTuple):
     name: str
     type: str
     latched: bool
+    own: bool = True  # of the recorder's namespace
 
 
 class Repeats:

@@ -15,6 +15,7 @@ PARAMETERS = {
         "the recording: a bag, a CSV with its YAML, an NHTSA EV5 or ISO-MME folder, nhtsa:NUMBER",
         needed="give a recording, --ros-args -p bag:=PATH",
     ),
+    "then": Allowed([""], "recordings to replay after it, one by one, each as a test of its own"),
     "rate": Allowed(1.0, "times real time", LOWEST_RATE, HIGHEST_RATE, live=True),
     "start_offset": Allowed(0.0, "s after the first sample at which to begin", 0.0, 1e6),
     "duration": Allowed(0.0, "s to play from there; 0: to the end", 0.0, 1e6),
@@ -23,6 +24,8 @@ PARAMETERS = {
     "loop": Allowed(False, "start again after the last sample, as a new run", live=True),
     "channels": Allowed([""], "names of the channels to replay, or patterns such as rib_*; none: all"),
     "exclude": Allowed([""], "names or patterns of channels to leave out"),
+    "regex": Allowed("", "regular expression: channels in whose name it is found are replayed, too"),
+    "exclude_regex": Allowed("", "regular expression of channels to leave out"),
     "delay": Allowed(0.0, "s to wait before the first sample, once the subscribers are there", 0.0, 3600.0),
     "start_paused": Allowed(False, "wait for resume, step or burst before the first sample"),
     "keep_alive": Allowed(False, "stay after the last sample, for seek, step and resume"),
@@ -35,7 +38,10 @@ PARAMETERS = {
     "finish_timeout": Allowed(
         300.0, "s after the last sample for nodes that take part to get what they lack", 0.0, 1e5
     ),
-    "clock": Allowed(True, "publish /clock with each message on samples"),
+    "clock": Allowed(
+        "auto", "publish /clock; auto: outside a namespace, where nobody else does", choices=("auto", "true", "false")
+    ),
+    "rosbag2_services": Allowed(False, "serve rosbag2_player/pause and so on, with rosbag2_interfaces' types, too"),
     "progress": Allowed("auto", "keep a progress line; auto: on a terminal", choices=ON_A_TERMINAL),
     "keyboard": Allowed("auto", "take keys, h lists them; auto: on a terminal", choices=ON_A_TERMINAL),
 }

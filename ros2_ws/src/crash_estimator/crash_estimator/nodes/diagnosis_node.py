@@ -80,7 +80,7 @@ class DiagnosisNode(Node):
         others = names_in(asked["estimators"])
         self.model = ModelRevisions(self, structure, self.effects, others, test, self._on_other_model)
         self.attending = Attending(self, "diagnosis", self._progress)
-        self.asking = Asking(self, f"{replay}/get_samples", self.attending, self._on_samples_again, self._fitting)
+        self.asking = Asking(self, replay, self.attending, self._on_samples_again, self._fitting)
         self.catching_up = CatchingUp(self, self.attending, self._place, self._ask_for_rest)
         self.feed = ChannelFeed(self, "samples", self._on_feed_begins, self._on_feed)
         HealthReport(self, "answers", partial(diagnosis_health, self))

@@ -26,7 +26,7 @@ PARAMETERS = {
     ),
     "add_first": Allowed(False, "add the first effect that a final answer names, once; none where it is unexplained"),
     "estimators": Allowed([""], "names of estimators that it is added to as well", pattern=NAME),
-    "replay": Allowed("replay", "node that samples are asked of which were missed", pattern=NAME),
+    "replay": Allowed("", "node that samples are asked of which were missed; empty: the replay there is", pattern=NAME),
 }
 
 

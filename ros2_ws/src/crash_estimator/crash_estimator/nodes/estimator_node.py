@@ -64,7 +64,7 @@ class EstimatorNode(Node):
         self.topics = EstimatorTopics(self, names_in(asked["value_topics"]))
         self.again = EstimatesAgain(self)
         self.attending = Attending(self, "estimator", self._progress)
-        self.intake = Intake(self, f"{asked['replay']}/get_samples", self.attending, self)
+        self.intake = Intake(self, asked["replay"], self.attending, self)
         HealthReport(self, "filter", partial(estimator_health, self))
         self.create_service(Trigger, "~/reset", self._on_reset)
         self.create_service(AddEffect, "~/add_effect", self._on_add_effect)

@@ -21,7 +21,7 @@ PARAMETERS = {
     "effects": Allowed("", "your own effects, a .py file; it is executed"),
     "effective_mass": Allowed(False, "find the masses that go with the accelerometers first"),
     "value_topics": Allowed([""], "parameters that get a topic of their own, names or patterns such as *.stiffness"),
-    "replay": Allowed("replay", "node that samples are asked of which were missed", pattern=NAME),
+    "replay": Allowed("", "node that samples are asked of which were missed; empty: the replay there is", pattern=NAME),
 }
 
 LONG = 1e3

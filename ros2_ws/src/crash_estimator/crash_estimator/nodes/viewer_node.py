@@ -23,6 +23,7 @@ from crash_replay.attending import Attending, Progress
 from crash_replay.complaints import Complaints
 from crash_replay.foreign_text import visible
 from crash_replay.health import HealthReport
+from crash_replay.namespaces import is_own
 from crash_replay.node_parameters import declare_parameters, names_in
 from crash_replay.output import check_outputs
 from crash_replay.qos import LATCHED, SAID, STREAM, UNACKNOWLEDGED
@@ -177,8 +178,8 @@ class ViewerNode(Node):
     def _estimators_around(self) -> set[str]:
         own = self.get_namespace().rstrip("/") + "/"
         kind, last = "crash_msgs/msg/ResidualsBlock", "/block/residuals"
-        topics = [topic for topic, kinds in self.get_topic_names_and_types() if kind in kinds]
-        return {topic.removeprefix(own).removesuffix(last) for topic in topics if topic.endswith(last)}
+        topics = [topic for topic, kinds in self.get_topic_names_and_types() if kind in kinds and topic.endswith(last)]
+        return {topic.removeprefix(own).removesuffix(last) for topic in topics if is_own(self, topic)}
 
     def _be_counted(self) -> None:
         """Subscribe to `samples` once all estimators can be heard, until the first sample.

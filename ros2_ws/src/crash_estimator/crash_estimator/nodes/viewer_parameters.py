@@ -3,7 +3,7 @@
 from crash_replay.node_parameters import NAME, Allowed
 
 PARAMETERS = {
-    "estimators": Allowed([""], "names of estimators; empty: all there are", pattern=NAME),
+    "estimators": Allowed([""], "names of estimators; empty: all in its namespace", pattern=NAME),
     "models": Allowed([""], "files of models other than the ready ones, for the validation"),
     "port": Allowed(9876, "of the gRPC server on 127.0.0.1 that viewers connect to; 0: a free one", 0, 65_535),
     "rrd": Allowed("crash.rrd", "file that the recording is written to; empty: none"),
