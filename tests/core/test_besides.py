@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 from rclpy.serialization import deserialize_message
 
 from crash_estimator.cli.common import write_json
-from crash_estimator.cli.estimate import as_json
+from crash_estimator.cli.work.estimate import as_json
 from crash_estimator.core.errors import equation_errors
 from crash_estimator.core.estimate import ParameterStatus
 from crash_estimator.core.fold import run

@@ -24,7 +24,8 @@ from crash_estimator.core.diagnosis.selection.selection_step import SelectionSte
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.kept import Kept, Rows
 from crash_estimator.nodes.diagnosis_story import Told, story
-from crash_estimator.nodes.diagnosis_worker import Answerer, Task
+from crash_estimator.nodes.diagnosis_answerer import Answerer
+from crash_estimator.nodes.diagnosis_worker import Task
 from crash_replay.recording import Recording, RecordingError
 
 EVERY = 0.005

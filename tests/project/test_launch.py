@@ -20,7 +20,7 @@ from crash_estimator.chaos.launch_words import (
 )
 from crash_estimator.core.methods import METHODS
 from crash_estimator.demo.domain import free_domain
-from crash_replay.replay_parameters import PARAMETERS
+from crash_replay.replay_command import PARAMETERS
 
 BAG = PACKAGES.parents[1] / "bags/impactor_single.mcap"
 LAUNCH_FILE = PACKAGES / "crash_estimator/launch/live.launch.py"
@@ -137,7 +137,7 @@ def test_the_parameters_are_those_of_the_nodes(launched):
     nodes = launched(bag="b", model="m", diagnosis="true")
     assert set(vars(nodes["replay"])) - {"package"} <= set(PARAMETERS)
     for name in ("estimator", "diagnosis", "viewer"):
-        node = import_module(f"crash_estimator.nodes.{name}_node")
+        node = import_module(f"crash_estimator.nodes.{name}_command")
         assert set(vars(nodes[name])) - {"package"} <= set(node.PARAMETERS)
 
 

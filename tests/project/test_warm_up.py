@@ -11,7 +11,7 @@ from crash_estimator.core.diagnosis.report.diagnosis import diagnose
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.methods import METHODS, make_estimator
 from crash_estimator.model_file import load_model
-from crash_estimator.nodes.diagnosis_worker import Answerer
+from crash_estimator.nodes.diagnosis_answerer import Answerer
 from crash_replay.synthetic.recordings import simulate_recording
 
 with compiling_said(print):

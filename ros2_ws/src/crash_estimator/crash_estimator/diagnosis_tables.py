@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.constants import g as G
 
+from crash_replay.gravity import G
 from crash_replay.shown_units import readable
 
 from .core.diagnosis import THRESHOLDS, Diagnosis, MisfitWindow, Model, Ranked

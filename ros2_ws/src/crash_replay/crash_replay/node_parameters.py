@@ -8,13 +8,14 @@ given = declare_parameters(self, PARAMETERS)      # {"every": 0.002}
 import re
 from collections.abc import Collection, Mapping
 from difflib import get_close_matches
-from typing import Any, NamedTuple
-
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rclpy.node import Node
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .fault import Fault
 from .limits import TEXT, shown
+
+if TYPE_CHECKING:  # a table can be read without ROS
+    from rcl_interfaces.msg import ParameterDescriptor
+    from rclpy.node import Node
 
 KIND = {str: "a text", bool: "true or false", int: "a whole number", float: "a number", list: "a list of names"}
 OF_EVERY_NODE = ("use_sim_time", "start_type_description_service", "qos_overrides")
@@ -38,7 +39,7 @@ class Allowed(NamedTuple):
     needed: str = ""  # what to do where it is empty, which it may not be
 
 
-def declare_parameters(node: Node, table: Mapping[str, Allowed], live: Collection[str] = ()) -> dict[str, Any]:
+def declare_parameters(node: "Node", table: Mapping[str, Allowed], live: Collection[str] = ()) -> dict[str, Any]:
     """Declare all of them and give their values; only those in `live` can be set later.
 
     The node must have declared its overrides by itself, untyped: so what is wrong with one is said in our words.
@@ -105,7 +106,9 @@ def names_in(value: list[str]) -> list[str]:
     return [name for name in value if name]
 
 
-def _descriptor(allowed: Allowed, live: bool) -> ParameterDescriptor:
+def _descriptor(allowed: Allowed, live: bool) -> "ParameterDescriptor":
+    from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+
     descriptor = ParameterDescriptor(description=allowed.meaning, read_only=not live)
     if isinstance(allowed.default, float):
         descriptor.dynamic_typing = True  # an integer is a number too

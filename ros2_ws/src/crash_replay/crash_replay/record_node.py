@@ -1,11 +1,4 @@
-"""`record`: writes what replay, estimators and diagnosis publish into an MCAP file, which is readable at every instant.
-
-    ros2 run crash_replay record --ros-args -p to:=estimates.mcap -p wait_for:=2
-
-It listens to `samples` as soon as it hears `wait_for` estimators, so a replay that waits for it begins when all else is
-heard. It ends when the replay has gone and everybody has said the last word, or by a signal, and says whether the
-recording is complete: on the terminal, in the file and by its exit status. What it has missed itself it asks for.
-"""
+"""The node of `record`: what replay, estimators and diagnosis publish goes to a file; `record_command` says with what."""
 
 import sys
 import time
@@ -25,8 +18,9 @@ from .fault import Fault, NobodyReads
 from .fetching import Fetching
 from .health import Health, HealthReport, Level
 from .listening import Listening
-from .node_parameters import Allowed, declare_parameters, names_in
+from .node_parameters import declare_parameters, names_in
 from .numbers import Numbers
+from .record_command import PARAMETERS
 from .recorded_topics import NUMBERED, Choice, about, unreadable
 from .recorder import Heard, Recorder
 from .ros_runtime import run
@@ -42,13 +36,6 @@ STOOD_STILL = 2.0
 """s between two looks that are worth saying."""
 GOES_ON = {"crash_msgs/msg/Attendance", "crash_msgs/msg/ReplayState", "diagnostic_msgs/msg/DiagnosticArray"}
 """What is said as long as a node is there."""
-
-PARAMETERS = {
-    "to": Allowed("", "the file to write, which must not exist: *.mcap", needed="-p to:=estimates.mcap"),
-    "wait_for": Allowed(1, "estimators to hear before the samples", 0, 1000),
-    "topics": Allowed([""], "names or patterns such as /kalman/*; without any: all but channels and clock"),
-    "exclude": Allowed([""], "topics to leave out, names or patterns"),
-}
 
 
 class RecordError(Fault):

@@ -1,4 +1,4 @@
-"""`replay`: publishes a recording at its sample rate times `rate`, under control by services."""
+"""The node of `replay`: a recording is published as its clockwork says; `replay_command` says with what."""
 
 import math
 import signal
@@ -27,8 +27,8 @@ from .node_parameters import ParameterError, checked, declare_parameters, names_
 from .pacing import Outcome, Pacing
 from .player import SECOND, CommandError, Player
 from .readers import read_source
+from .replay_command import LIVE, PARAMETERS, window_of
 from .replay_health import replay_health
-from .replay_parameters import LIVE, PARAMETERS, window_of
 from .replay_topics import ReplayTopics
 from .ros_runtime import spin
 from .said import say

@@ -11,10 +11,9 @@ from pathlib import Path
 from time import process_time
 from typing import NamedTuple
 
-from scipy.constants import g as G
-
 from crash_replay.conditioning import filter_recording
 from crash_replay.fault import guarded
+from crash_replay.gravity import G
 from crash_replay.readers import read_source
 from crash_replay.recording import Recording, RecordingError
 from crash_replay.said import Parser, say

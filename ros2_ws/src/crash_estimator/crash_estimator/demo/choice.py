@@ -13,7 +13,8 @@ from crash_replay.readers import is_bag, name_of, read_source
 from crash_replay.recording import Recording, RecordingError, Test
 
 from ..core.structure import ModelError, Structure
-from ..model_file import load_model, ready_models
+from ..model_file import load_model
+from ..ready_models import ready_models
 
 BUNDLED = Path("bags/hidden_effect.mcap")
 METHODS_OF_ONE_MODEL = ("mrls", "constrained_kalman")

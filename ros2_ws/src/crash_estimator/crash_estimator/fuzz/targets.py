@@ -17,7 +17,7 @@ from crash_replay.limits import most_samples
 from crash_replay.node_parameters import checked
 from crash_replay.readers import read_source
 from crash_replay.recording import Channel, Test
-from crash_replay.replay_parameters import PARAMETERS as REPLAY
+from crash_replay.replay_command import PARAMETERS as REPLAY
 from crash_replay.ros_messages import channel_to_msg, decoded, stamp, test_from_msg
 
 from ..cli.common import parse_settings
@@ -28,13 +28,13 @@ from ..core.methods import METHODS, make_estimator
 from ..following.alignment import Alignment
 from ..kept import Kept
 from ..model_file import load_model
-from ..nodes.diagnosis_node import PARAMETERS as DIAGNOSIS
+from ..nodes.diagnosis_command import PARAMETERS as DIAGNOSIS
 from ..nodes.effect_requests import with_effect
+from ..nodes.estimator_command import PARAMETERS as ESTIMATOR
 from ..nodes.estimator_model import EstimatorModel
-from ..nodes.estimator_node import PARAMETERS as ESTIMATOR
 from ..nodes.samples import received, rows_of, what_is_wrong
+from ..nodes.viewer_command import PARAMETERS as VIEWER
 from ..nodes.viewer_messages import BLOCK_OF, FINDING_OF, test_block
-from ..nodes.viewer_node import PARAMETERS as VIEWER
 from . import live
 from .bags import spoilt_bag
 from .mutations import FLOATS, INTEGERS, NUMBERS, PYTHON, WORDS, spoilt, spoilt_message

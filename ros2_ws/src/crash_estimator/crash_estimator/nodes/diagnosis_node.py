@@ -1,14 +1,10 @@
-"""`diagnosis`: says, while a test is replayed, which physical effect the model lacks, and where it fails.
-
-Subscribes to `test` and `samples` (or `channels/<name>`, from rosbag2's player); publishes `~/ranking`, `~/misfit` and
-`~/revisions` as the samples come, and after the last one the offline answer. Adding an effect, or taking one out, makes
-a new revision of its model, and the same question is asked of it on the samples that are kept.
-"""
+"""The node of `diagnosis`: what the model lacks, asked as the samples come; `diagnosis_command` says with what."""
 
 import sys
 from functools import partial
+from typing import TYPE_CHECKING
 
-from crash_msgs.msg import Samples, TestInfo
+from crash_msgs.msg import Ranking, Samples, TestInfo
 from rclpy.node import Node
 from rclpy.task import Future
 
@@ -17,46 +13,38 @@ from crash_replay.bag import read_bag
 from crash_replay.complaints import Complaints
 from crash_replay.health import HealthReport
 from crash_replay.limits import most_samples
-from crash_replay.node_parameters import NAME, Allowed, declare_parameters, names_in
+from crash_replay.node_parameters import declare_parameters, names_in
 from crash_replay.qos import EVERY_SAMPLE, LATCHED
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import stamp, stamp_ns, test_from_msg
 from crash_replay.ros_runtime import run
 
-from ..core.diagnosis import UNEXPLAINED, OnlineAnswer
 from ..core.effects import EFFECTS
 from ..core.effects.user import load_effects
 from ..core.kinematics import Kinematics
 from ..core.structure import ModelError, Structure
 from ..kept import Kept, Rows
-from ..model_file import MODEL, load_model
+from ..model_file import load_model
 from .asking import Asking
 from .catching_up import CatchingUp
 from .channel_feed import ChannelFeed
+from .diagnosis_command import PARAMETERS
+from .diagnosis_health import diagnosis_health
 from .diagnosis_messages import Moment
 from .diagnosis_telling import Telling
 from .diagnosis_worker import Task, Worker, WorkerError
 from .hearing import hear
 from .model_revisions import ModelRevisions
-from .node_health import diagnosis_health
 from .samples import Received, fitting, received, rows_of, what_is_wrong
+
+if TYPE_CHECKING:  # an answer brings it along
+    from ..core.diagnosis import OnlineAnswer
 
 LOOK = 0.02
 """s of wall clock between two looks whether an answer has come."""
 
 TOLERATED = 0.01
 """Share of the samples so far that may be missing: the motion is integrated across small gaps only."""
-
-
-PARAMETERS = {
-    "model": Allowed("", MODEL, needed=f"give {MODEL}"),
-    "with_bags": Allowed([""], "other recordings of the same structure, used with the replayed one"),
-    "effects": Allowed("", "your own effects, a .py file; it is executed"),
-    "every": Allowed(0.002, "s of the crash between two rankings", 1e-5, 1e4),
-    "add_first": Allowed(False, "add the first effect that a final answer names, once; none where it is unexplained"),
-    "estimators": Allowed([""], "names of estimators that it is added to as well", pattern=NAME),
-    "replay": Allowed("replay", "node that samples are asked of which were missed", pattern=NAME),
-}
 
 
 class DiagnosisNode(Node):
@@ -81,7 +69,7 @@ class DiagnosisNode(Node):
         self.done = Future()  # when nothing more can be diagnosed
         self.prepared = False  # its process has compiled its code
         self.rest_of = 0  # the pass that what has not come is asked of
-        self.finals: dict[tuple[int, int], OnlineAnswer] = {}  # by revision and samples missing
+        self.finals: dict[tuple[int, int], "OnlineAnswer"] = {}  # by revision and samples missing
         self.complaints = Complaints(lambda line: self.get_logger().error(line))
         self.telling = Telling(self, structure)
         self.worker = Worker(structure, effects, self.bags)
@@ -252,16 +240,16 @@ class DiagnosisNode(Node):
             )
         return not self.stopped
 
-    def _conclude(self, at: Moment, answer: OnlineAnswer) -> None:
+    def _conclude(self, at: Moment, answer: "OnlineAnswer") -> None:
         self.telling.tell(at, answer, self.kept, self.time_zero)
         if not at.final:
             return
         self._add_found(at, answer)
         self.attending.tell()
 
-    def _add_found(self, at: Moment, answer: OnlineAnswer) -> None:
+    def _add_found(self, at: Moment, answer: "OnlineAnswer") -> None:
         self.finals[at.revision, self.kept.missing(at.number + 1)] = answer
-        if self.adds and answer.found and answer.verdict != UNEXPLAINED:
+        if self.adds and answer.found and answer.verdict != Ranking.UNEXPLAINED:
             self.adds = False
             self.model.add(answer.found[0])
 

@@ -1,10 +1,4 @@
-"""`estimator`: follows the replayed samples with one model and one method, and publishes what it finds.
-
-Subscribes to `test` and `samples`, or to `channels/<name>` where rosbag2's player plays the bag; publishes
-`~/parameters` and `~/residuals` by name, the same in blocks on `~/block/parameters` and `~/block/residuals`,
-`~/forces`, `~/events` and `~/state`, and answers on `answers` what it has done with.
-Several run side by side under different names (`--ros-args -r __node:=mrls`).
-"""
+"""The node of `estimator`: a model and a method that follow the replayed samples; `estimator_command` says with what."""
 
 import sys
 from collections.abc import Callable
@@ -19,7 +13,7 @@ from crash_replay.attending import Attending, Progress
 from crash_replay.complaints import Complaints
 from crash_replay.health import HealthReport
 from crash_replay.limits import most_samples
-from crash_replay.node_parameters import NAME, Allowed, declare_parameters, names_in
+from crash_replay.node_parameters import declare_parameters, names_in
 from crash_replay.qos import EVERY_SAMPLE, LATCHED, UNLATCHED
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import stamp_ns, test_from_msg
@@ -27,33 +21,22 @@ from crash_replay.ros_runtime import run
 
 from ..core.compile_cache import compiling_said
 from ..core.effects.change import remove_effect
-from ..core.methods import METHODS
 from ..core.structure import ModelError, Structure
 from ..following.again import estimated_again
 from ..following.arrivals import Waiting, missing_text
 from ..following.columns import Columns, FilterFailure
 from ..following.follower import Follower
 from ..kept import Kept, Rows
-from ..model_file import MODEL
 from .channel_feed import ChannelFeed
 from .effect_requests import with_effect
 from .estimates_again import EstimatesAgain
+from .estimator_command import PARAMETERS
+from .estimator_health import estimator_health
 from .estimator_model import EstimatorModel
 from .estimator_topics import EstimatorTopics
 from .hearing import hear
 from .intake import Intake
-from .node_health import estimator_health
 from .samples import Received, fitting, received, rows_of, what_is_wrong
-
-PARAMETERS = {
-    "model": Allowed("", MODEL, needed=f"give {MODEL}"),
-    "method": Allowed("constrained_kalman", f"one of {', '.join(METHODS)}"),
-    "settings": Allowed([""], "settings of the method, such as forgetting=0.98"),
-    "effects": Allowed("", "your own effects, a .py file; it is executed"),
-    "effective_mass": Allowed(False, "find the masses that go with the accelerometers first"),
-    "value_topics": Allowed([""], "parameters that get a topic of their own, names or patterns such as *.stiffness"),
-    "replay": Allowed("replay", "node that samples are asked of which were missed", pattern=NAME),
-}
 
 
 class EstimatorNode(Node):

@@ -1,10 +1,4 @@
-"""`viewer`: shows what the estimators say in Rerun, live, and writes it to a .rrd file.
-
-Subscribes to `test`, each estimator's `block/parameters`, `block/residuals`, `forces` and `events`, and the diagnosis'
-`ranking`, `misfit` and `revisions`. Callbacks only queue what comes; decoding, drawing and waiting for a slow screen
-happen in the recorder's own thread. What it has missed itself it asks the estimators for; what it lacks in the end it
-says on the terminal, in the file and by its exit status.
-"""
+"""The node of `viewer`: what estimators and diagnosis say goes to Rerun; `viewer_command` says with what."""
 
 import os
 import subprocess
@@ -22,7 +16,7 @@ from crash_replay.attending import Attending, Progress
 from crash_replay.complaints import Complaints
 from crash_replay.foreign_text import visible
 from crash_replay.health import HealthReport
-from crash_replay.node_parameters import NAME, Allowed, declare_parameters, names_in
+from crash_replay.node_parameters import declare_parameters, names_in
 from crash_replay.output import check_outputs
 from crash_replay.qos import LATCHED, SAID, STREAM, UNACKNOWLEDGED
 from crash_replay.ros_messages import decoded, test_from_msg
@@ -30,13 +24,15 @@ from crash_replay.ros_runtime import run
 from crash_replay.said import say
 
 from ..core.structure import Structure
-from ..model_file import load_model, ready_models
+from ..model_file import load_model
+from ..ready_models import ready_models
 from ..viewer.native import has_display, open_viewer
 from ..viewer.recorder import Recorder
 from ..viewer.sinks import Sinks
 from .hearing import hear
-from .node_health import viewer_health
 from .viewer_account import Account
+from .viewer_command import PARAMETERS
+from .viewer_health import viewer_health
 from .viewer_messages import BLOCK_OF, FINDING_OF, test_block
 from .whole_estimates import WholeEstimates
 
@@ -45,21 +41,6 @@ SETTLED = 0.3
 
 HURRIED, PATIENT = 9.0, 60.0
 """s to end the file: where a signal has come before the end, who sent it waits not for long (`launch`: 10 s)."""
-
-
-PARAMETERS = {
-    "estimators": Allowed([""], "names of estimators; empty: all there are", pattern=NAME),
-    "models": Allowed([""], "files of models other than the ready ones, for the validation"),
-    "port": Allowed(9876, "of the gRPC server on 127.0.0.1 that viewers connect to; 0: a free one", 0, 65_535),
-    "rrd": Allowed("crash.rrd", "file that the recording is written to; empty: none"),
-    "memory_limit": Allowed(
-        "1GiB",
-        "what the server keeps for viewers that come late, such as 500MB or 10%",
-        pattern=r"\d{1,6}(%|[kMGT]i?B|B)",
-    ),
-    "open": Allowed(True, "open the native viewer where there is a display"),
-    "exit_when_finished": Allowed(False, "end with the replay"),
-}
 
 
 class ViewerNode(Node):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crash_replay.readers.units import G
+from crash_replay.gravity import G
 from crash_replay.recording import Recording
 from crash_replay.synthetic.curves import Curve, constant, stepped
 from crash_replay.synthetic.dummy import side_dummy_unpadded

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.constants import g as G
 
+from ..gravity import G
 from ..recording import Recording, RecordingError, Test
 from .integrate import MAX_STEP, History, simulate
 from .sensors import Reading, Sensor, read

@@ -22,9 +22,8 @@ Left out, because no method could name them from what is recorded:
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.constants import g as G
-from scipy.integrate import cumulative_trapezoid
 
+from ...gravity import G
 from ..curves import Curve
 from ..integrate import simulate
 from ..scenario import signals_of
@@ -172,6 +171,8 @@ def _driving(specimen: Specimen, channel: str) -> Sensor | None:
 
 def _driven_as_recorded(bare: Specimen, sensor: Sensor) -> Specimen:
     """The specimen as a model would have it that takes a wrong channel for its body's motion."""
+    from scipy.integrate import cumulative_trapezoid  # late: it takes longer to import than all the rest
+
     motion, step = bare.body(sensor.of).motion, 1.0 / COARSE_RATE
     time = np.arange(0.0, bare.scenario.duration + step, step)
     seen = np.where(time >= sensor.delay, motion.acceleration(time - sensor.delay), 0.0)

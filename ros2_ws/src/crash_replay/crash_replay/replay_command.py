@@ -1,9 +1,11 @@
-"""The parameters of `replay`, with what they mean and may be."""
+"""`replay`: publishes a recording at its sample rate times `rate`, under control by services."""
 
 import math
+import sys
 from typing import Any
 
 from .node_parameters import Allowed
+from .node_program import node_program
 from .player import HIGHEST_RATE, LOWEST_RATE
 from .selection import Window
 
@@ -46,3 +48,11 @@ PARAMETERS = {
 
 def window_of(values: dict[str, Any]) -> Window:
     return Window(values["start_offset"], values["duration"], values["from"], values["until"])
+
+
+def main() -> int:
+    return node_program("replay", __doc__, PARAMETERS, "crash_replay.replay_node")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
