@@ -1,4 +1,4 @@
-.PHONY: help demo test bags thesis benchmark benchmark-effects benchmark-outside chaos endurance fuzz clean
+.PHONY: help demo lint check test bags thesis benchmark benchmark-effects benchmark-outside chaos endurance fuzz clean
 
 help: # what there is to make
 	@sed -n 's/^\([a-z-]*\):.*# /make \1	/p' Makefile
@@ -10,9 +10,13 @@ demo: # a crash replayed, what its model lacks named, added and shown in Rerun; 
 # Without autoload: the plugins of an installed ROS 2 are written for an older pytest.
 PYTEST = PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 tools/env python -m pytest -p _hypothesis_pytestplugin -p xdist.plugin
 
+lint: # style and types: ruff and mypy with the settings of pyproject.toml
+	@tools/env python -m ruff check --quiet .
+	@tools/env python -m ruff format --check --quiet .
+	@tools/env python -m mypy
+
 # A file's tests are run by one of two processes; -n 0 in PYTEST_ARGS: all by one. What is compiled is so once, before.
-test: # all tests; some of them with PYTEST_ARGS="-k name"
-	@tools/setup
+test: lint # all tests, style and types first; some of them with PYTEST_ARGS="-k name"
 	@tools/screenshot-libs
 	@tools/env python -m crash_estimator.warm_up
 	@$(PYTEST) -n 2 --dist loadfile $(PYTEST_ARGS)

@@ -42,7 +42,7 @@ def test_a_whole_replay(bag, listener):
     """Every sample, the clock at each of them, every channel, the test and the state."""
     clocks, channels = [], [[] for _ in RECORDING.test.channels]
     listener.listen(Clock, "/clock", clocks.append, STREAM)
-    for channel, messages in zip(RECORDING.test.channels, channels):
+    for channel, messages in zip(RECORDING.test.channels, channels, strict=True):
         listener.listen(channel_type(channel), f"channels/{channel.name}", messages.append, STREAM)
     with Replay(bag, wait_for=1, start_paused=True) as replay:
         wait_until(lambda: listener.states and listener.states[-1].subscribers)
@@ -59,7 +59,7 @@ def test_a_whole_replay(bag, listener):
     stamps = (RECORDING.time_ns + time_zero_ns(RECORDING)).tolist()
     assert [stamp_ns(message.header.stamp) for message in listener.messages] == stamps
     assert [stamp_ns(message.clock) for message in clocks] == stamps
-    for k, (channel, messages) in enumerate(zip(RECORDING.test.channels, channels)):
+    for k, (channel, messages) in enumerate(zip(RECORDING.test.channels, channels, strict=True)):
         assert [stamp_ns(message.header.stamp) for message in messages] == stamps
         assert_array_equal([channel_from_msg(channel, message) for message in messages], RECORDING.values[:, k])
     last = listener.states[-1]

@@ -109,7 +109,7 @@ def cast(crash, streams) -> Cast:
 
 def whole(cast: Cast, crash: crash_data.Crash) -> Cast:
     block = revision(crash, "two_mass", 0.1, True)
-    outputs = tuple(zip(block.name, block.unit))
+    outputs = tuple(zip(block.name, block.unit, strict=True))
     return replace(cast, rankings=(0, 1), outputs=outputs, revisions_whole=True, judged=NAMES)
 
 
@@ -198,7 +198,7 @@ class TestRevisions:
         given, better = revision(crash, "m", 0.3, True), revision(crash, "m + a on b", 0.0, True)
         drawing = whiteness_drawing([given, better], 0)
         for k, block in enumerate((given, better)):
-            stems = [s for s, c in zip(drawing.strips, drawing.strip_colors) if c == revision_color(k)]
+            stems = [s for s, c in zip(drawing.strips, drawing.strip_colors, strict=True) if c == revision_color(k)]
             assert len(stems) == LAGS
             found = autocorrelation(block.residual[:, 0], LAGS).values[1:]
             heights = np.array([-stem[1][1] + stem[0][1] for stem in stems])
@@ -233,8 +233,8 @@ class TestValidation:
         assert "auto-correlation: lags within 95% limits" in text and "ISO/TS 18571" in text
         cross = judged.validation.equations[0].cross["cab_barrier.crush"]
         drawing = validation.correlation_drawing(cast, {NAMES[0]: cross})
-        for level, color in zip((0.90, 0.95, 0.99), validation.LIMIT_COLORS):
-            lines = [s for s, c in zip(drawing.strips, drawing.strip_colors) if c == color]
+        for level, color in zip((0.90, 0.95, 0.99), validation.LIMIT_COLORS, strict=True):
+            lines = [s for s, c in zip(drawing.strips, drawing.strip_colors, strict=True) if c == color]
             drawn = sorted({round((-strip[0][1] - 0.45) / 0.45, 9) for strip in lines})
             limit = round(cross.limit(level), 9)
             assert drawn == ([-limit, limit] if limit <= 1 else [])

@@ -34,7 +34,7 @@ from .tables import error_table, parameter_table, unit_of
 from .validation_tables import comparison_table, covariance_table, whiteness_table
 
 
-def write_report(
+def write_report(  # noqa: PLR0913 - every option of the command
     recording: Recording,
     structure: Structure,
     methods: Sequence[str],
@@ -50,8 +50,8 @@ def write_report(
 ) -> Path:
     """Write `report.html` into the folder, with `markdown` also `report.md` and its figures -> the page.
 
-    The settings go to the methods that have them; seconds: after which the diagnosis tries nothing more; `told` hears of
-    each part when it is done, and how long it took.
+    The settings go to the methods that have them; seconds: after which the diagnosis tries nothing more; `told` hears
+    of each part when it is done, and how long it took.
     """
     if not ((recording.time > 0.0) & (recording.time <= end)).any():
         raise ModelError(f"test {recording.test.id} has no samples between the impact and {end:g} s")
@@ -179,7 +179,7 @@ def _free_run(
     description, estimates = result.description, result.estimates
     simulated = free_run(structure, description, estimates, end=end)
     panels = []
-    for k, (name, unit) in enumerate(zip(description.equations, description.equation_units)):
+    for k, (name, unit) in enumerate(zip(description.equations, description.equation_units, strict=True)):
         shown, factor = readable(unit, simulated.measured[:, k])
         lines = [
             Line(simulated.time * 1e3, smooth(simulated.measured[:, k]) * factor, "measured", "#555555"),
@@ -231,6 +231,8 @@ def _masses(recording: Recording, structure: Structure, end: float) -> list[Bloc
     time_ms, sigma = time_of(estimates), partial(column_of, estimates, "std")
     lines = [Line(time_ms, column_of(estimates, "parameters", k), n, spread=sigma(k)) for k, n in enumerate(names)]
     panel = Panel("effective masses", "time in ms", "kg", lines, y_range=(0.0, 2.0 * float(last.parameters.sum())))
-    found = ", ".join(f"{name} {m:.0f} +- {s:.0f} kg" for name, m, s in zip(names, last.parameters, last.std))
+    found = ", ".join(
+        f"{name} {m:.0f} +- {s:.0f} kg" for name, m, s in zip(names, last.parameters, last.std, strict=True)
+    )
     text = f"{found}; together {last.parameters.sum():.0f} kg."
     return [Heading("Effective masses (figures 4.12, 4.26)"), Paragraph(text), Figure("masses", [panel], columns=1)]

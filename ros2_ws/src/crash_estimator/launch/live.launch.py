@@ -7,7 +7,6 @@ exit_when_finished:=true. Where one of them fails all end, with exit status 1.
 """
 
 from collections.abc import Callable
-from typing import List  # noqa: UP035  the one that launch_ros documents
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, EmitEvent, RegisterEventHandler
@@ -71,7 +70,7 @@ def generate_launch_description() -> LaunchDescription:
                 "lockstep": ParameterValue(LaunchConfiguration("lockstep"), value_type=bool),
                 "loop": ParameterValue(LaunchConfiguration("loop"), value_type=bool),
                 "start_paused": ParameterValue(LaunchConfiguration("start_paused"), value_type=bool),
-                "listeners": ParameterValue(listeners, value_type=List[str]),
+                "listeners": ParameterValue(listeners, value_type=list[str]),
                 "wait_timeout": 600.0,  # after an update they compile their code first
             }
         ],

@@ -1,4 +1,5 @@
-"""The node of `record`: what replay, estimators and diagnosis publish goes to a file; `record_command` says with what."""
+"""The node of `record`: what replay, estimators and diagnosis publish goes to a file; `record_command` says with
+what."""
 
 import sys
 import time

@@ -1,4 +1,5 @@
-"""What live.launch.py takes from launch and launch_ros, which do not come as wheels: the same words, standing in for them.
+"""What live.launch.py takes from launch and launch_ros, which do not come as wheels: the same words, standing in for
+them.
 
 A value that is only known when it is launched is asked with `value(given)`, the launch's arguments by name.
 """

@@ -31,7 +31,7 @@ def read_crash(source: str) -> Recording:
     return recording
 
 
-def check_written(arguments: argparse.Namespace, *recordings: str | None, **outputs: str | None) -> None:
+def check_written(arguments: argparse.Namespace, *recordings: str | None, **outputs: str | Path | None) -> None:
     """Before anything is read: nothing is written onto the recordings, the model or the effects; `json="out.json"` is
     `--json out.json`. Raises OutputError."""
     read = [*recordings, model_path(arguments.model), arguments.effects]
@@ -43,7 +43,7 @@ def effects_of(arguments: argparse.Namespace) -> dict[str, Effect]:
     return EFFECTS | (load_effects(arguments.effects) if arguments.effects else {})
 
 
-def parse_settings(pairs: list[str]) -> dict[str, float | int | bool]:
+def parse_settings(pairs: list[str]) -> dict[str, Any]:
     """["forgetting=0.98", "m=5"] -> {"forgetting": 0.98, "m": 5}."""
     settings = {}
     for pair in pairs:

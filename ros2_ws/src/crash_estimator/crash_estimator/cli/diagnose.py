@@ -1,4 +1,5 @@
-"""`diagnose RECORDING [RECORDING ...] --model M`: which physical effect is missing from a model, by recordings of it."""
+"""`diagnose RECORDING [RECORDING ...] --model M`: which physical effect is missing from a model, by recordings of
+it."""
 
 import argparse
 import sys

@@ -1,4 +1,5 @@
-"""`simulate RECORDING --model M`: estimate, then let the model run free from the impact and compare it with what was measured.
+"""`simulate RECORDING --model M`: estimate, then let the model run free from the impact and compare it with what was
+measured.
 
 With --from OTHER the forces come from another recording: a car with the interior of one test and the structure's
 motion of another, as in section 6.6 of the thesis.

@@ -46,8 +46,8 @@ def as_bag(source: Path, out: Path, cfc: int | str | None = None) -> tuple[Recor
     """The recording at `source`, a bag of it, and what was done to get it, in lines.
 
     A bag stays where and as it is; any other form is imported to out/NAME.mcap. `cfc`: its channel frequency class
-    of SAE J211-1, 0 for none; without it what a laboratory recorded, which is unfiltered, is filtered, each channel with
-    its own class.
+    of SAE J211-1, 0 for none; without it what a laboratory recorded, which is unfiltered, is filtered, each channel
+    with its own class.
     """
     recording = read_source(source)
     if is_bag(source):
@@ -81,7 +81,7 @@ def choose(
     doubled = next((name for name in names if names.count(name) > 1), None)
     if doubled:
         raise ModelError(f"two models are called {doubled}: give one of their files another name")
-    return [Choice(name, *pair) for name, pair in zip(names, pairs)]
+    return [Choice(name, *pair) for name, pair in zip(names, pairs, strict=False)]
 
 
 def _node_name(model: str, method: str, several_models: bool, several_methods: bool) -> str:

@@ -1,4 +1,5 @@
-"""The process that a `Worker` asks: it answers tasks, one after the other, as long as its node is there. No ROS here."""
+"""The process that a `Worker` asks: it answers tasks, one after the other, as long as its node is there. No ROS
+here."""
 
 import os
 import sys
@@ -6,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import Connection
+from typing import Any
 
 import numpy as np
 
@@ -79,8 +81,8 @@ def main(fd: int) -> None:
                 node.send(_reply(answerer, task))
 
 
-def node_says(node: Connection) -> Iterator[tuple | Task]:
-    """What comes from it as long as it is there: killed, it may leave half a message."""
+def node_says(node: Connection) -> Iterator[Any]:
+    """What comes from it, the set-up and then tasks, as long as it is there: killed, it may leave half a message."""
     while True:
         try:
             content = node.recv()

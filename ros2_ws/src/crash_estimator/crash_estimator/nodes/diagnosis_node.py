@@ -69,7 +69,7 @@ class DiagnosisNode(Node):
         self.done = Future()  # when nothing more can be diagnosed
         self.prepared = False  # its process has compiled its code
         self.rest_of = 0  # the pass that what has not come is asked of
-        self.finals: dict[tuple[int, int], "OnlineAnswer"] = {}  # by revision and samples missing
+        self.finals: dict[tuple[int, int], OnlineAnswer] = {}  # by revision and samples missing
         self.complaints = Complaints(lambda line: self.get_logger().error(line))
         self.telling = Telling(self, structure)
         self.worker = Worker(structure, effects, self.bags)

@@ -35,7 +35,8 @@ class Reply(NamedTuple):
 
 
 DEATHS = 3
-"""Times that the process may end by itself, in all, before no other one is started: a killed one is not its own fault."""
+"""Times that the process may end by itself, in all, before no other one is started: a killed one is not its own
+fault."""
 
 
 class WorkerError(Fault):

@@ -1,4 +1,5 @@
-"""The node of `estimator`: a model and a method that follow the replayed samples; `estimator_command` says with what."""
+"""The node of `estimator`: a model and a method that follow the replayed samples; `estimator_command` says with
+what."""
 
 import sys
 from collections.abc import Callable

@@ -23,7 +23,7 @@ class Curves:
 
     def write_residuals(self, cast: Cast, block: ResidualBlock) -> None:
         color, label = cast.color(block.estimator), cast.label(block.estimator)
-        for k, (body, si_unit) in enumerate(zip(block.name, block.unit)):
+        for k, (body, si_unit) in enumerate(zip(block.name, block.unit, strict=True)):
             factor = cast.shown(si_unit).factor
             self._measured(path("signal", body), block.time_ns, factor * block.measured[:, k])
             predicted = path("signal", body, "model", block.estimator)
@@ -48,7 +48,7 @@ class Curves:
     def write_parameters(self, cast: Cast, block: ParameterBlock) -> None:
         color, label = cast.color(block.estimator), cast.label(block.estimator)
         drawn = [name for name, _ in cast.member(block.estimator).parameters]
-        for k, (name, si_unit) in enumerate(zip(block.name, block.unit)):
+        for k, (name, si_unit) in enumerate(zip(block.name, block.unit, strict=True)):
             if name in drawn:
                 factor = cast.shown(si_unit).factor
                 line = path("parameter", name, block.estimator)

@@ -32,7 +32,7 @@ def overview(cast: Cast) -> rrb.Container:
             rrb.Horizontal(*loop_views(cast, first_elements(cast)[:2])),
             row_shares=[11, 10],
         ),
-        rrb.Vertical(*(pair(signal, residual) for signal, residual in zip(signals, residuals))),
+        rrb.Vertical(*(pair(signal, residual) for signal, residual in zip(signals, residuals, strict=False))),
         name="Overview",
     )
 

@@ -83,7 +83,7 @@ class Loops:
         start = self.last_point.get(key, line[0])
         self.last_point[key] = line[-1]
         joined = np.vstack([start, line])  # row i of the line is row i + 1 here
-        strips = [joined[a : b + 2] for a, b in zip(np.append(0, ends[:-1] + 1), ends)]
+        strips = [joined[a : b + 2] for a, b in zip(np.append(0, ends[:-1] + 1), ends, strict=False)]
         entity = loop_path(element, estimator)
         self.pen.once(entity, lambda: rr.LineStrips2D.from_fields(colors=[color], radii=[points(1.1)]))
         self.pen.columns(entity, time_ns[ends], rr.LineStrips2D.columns(strips=strips))

@@ -77,7 +77,7 @@ class Motion:
         ends = frame_ends(block.time_ns, cast.span)
         crush, force = (np.nan_to_num(values[ends], posinf=0.0, neginf=0.0) for values in (block.crush, block.force))
         new = (block.time_ns[ends], crush, force, block.state[ends])
-        for column, rows in zip((lane.time_ns, lane.crush, lane.force, lane.state), new):
+        for column, rows in zip((lane.time_ns, lane.crush, lane.force, lane.state), new, strict=True):
             column.append(rows)
         scale = self._grown(cast, block, crush, force)
         if scale == self.scale:
@@ -115,7 +115,7 @@ class Motion:
         name = member.name
         title = [(0.25, lane.top)]
         self.pen.labels(path("motion", name, "title"), title, [cast.label(name)], cast.color(name))
-        for body, mass in zip(member.bodies, member.masses):
+        for body, mass in zip(member.bodies, member.masses, strict=True):
             if body not in figure.columns:
                 continue
             half, plate = half_size(figure, body, mass), mass is None
@@ -136,7 +136,7 @@ class Motion:
         time_ns = time_ns + self.drawn_again
         shift = REST * crush @ lane.positions.T / scale.length  # (frames, bodies)
         at = {}
-        for k, (body, mass) in enumerate(zip(member.bodies, member.masses)):
+        for k, (body, mass) in enumerate(zip(member.bodies, member.masses, strict=True)):
             if body not in figure.columns:
                 continue
             x = figure.columns[body] * PITCH + shift[:, k]
@@ -145,13 +145,13 @@ class Motion:
             place = rr.Transform3D.columns(translation=np.column_stack([x, np.full_like(x, y), np.zeros_like(x)]))
             self.pen.columns(path("motion", member.name, "body", body), time_ns, place)
         colors = shapes.force_colors(force / scale.force, state == ElementState.APART)
-        for k, (spring, (a, b)) in enumerate(zip(member.elements, member.between)):
+        for k, (spring, (a, b)) in enumerate(zip(member.elements, member.between, strict=True)):
             entity = path("motion", member.name, "spring", spring)
             left, right = at[a][0] + at[a][1], at[b][0] - at[b][1]
             ones = np.ones_like(left)
             start = np.column_stack([left, row_y(lane.top, figure.rows[k]) * ones, 0 * ones])
             stretch = np.column_stack([right - left, ones, ones])
-            labels = [self._force_text(cast, f, s) for f, s in zip(force[:, k], state[:, k])]
+            labels = [self._force_text(cast, f, s) for f, s in zip(force[:, k], state[:, k], strict=True)]
             place = rr.Transform3D.columns(translation=start, scale=stretch)
             self.pen.columns(entity, time_ns, [*place, *rr.LineStrips2D.columns(colors=colors[:, k], labels=labels)])
 
@@ -165,7 +165,7 @@ class Motion:
 def _expected_crush(cast: Cast, block: ForceBlock) -> float:
     """A first guess of the length scale, m: the closing speed for part of the recording, at most a crash's 50 ms."""
     speed = np.nan_to_num(block.velocity[0])
-    at = {body: float(v) for body, v in zip(block.body, speed)}
+    at = {body: float(v) for body, v in zip(block.body, speed, strict=True)}
     closing = max(abs(at[a] - at[b]) for a, b in cast.member(block.estimator).between)
     return max(1.25 * closing * min(0.05, 0.3 * cast.span[1]), 0.02)
 

@@ -57,7 +57,7 @@ def ranking_drawing(block: RankingBlock) -> Drawing:
     moment = "all samples" if block.final else f"up to {1e3 * block.time:.1f} ms"
     drawing.text((0.5, top + 3.0 * LINE), f"{moment}: {block.said}", TITLE)
     meanings = (("told apart", TOLD), ("a rival fits as well", CONFOUNDED), (f"weak, below {FOUND:g}", WEAK))
-    for at, (meaning, color) in zip((0.13, 0.48, 0.84), meanings):
+    for at, (meaning, color) in zip((0.13, 0.48, 0.84), meanings, strict=False):
         drawing.text((at, top + 1.7 * LINE), meaning, color)
     return drawing
 
@@ -98,8 +98,11 @@ def error_drawing(steps: Sequence[Step], floor: float, shown: Shown) -> Drawing:
     shown_bars = bars[:1] + bars[1:][1 - REVISIONS :]  # the first and the newest
     title = f"RMS residual of this test, {shown.unit}; noise floor {shown.factor * floor:.3g}"
     drawing = bar_chart(shown_bars, title, rows=REVISIONS, line=shown.factor * floor)
-    keys = [("measured", MEASURED), *((f"fails {state}", color) for state, color in zip(STATES, STATE_COLORS))]
-    for at, (key, color) in zip((0.1, 0.34, 0.62, 0.88), keys):
+    keys = [
+        ("measured", MEASURED),
+        *((f"fails {state}", color) for state, color in zip(STATES, STATE_COLORS, strict=False)),
+    ]
+    for at, (key, color) in zip((0.1, 0.34, 0.62, 0.88), keys, strict=False):
         drawing.text((at, ROW * REVISIONS + 1.5 * LINE), key, _brighter(color))
     return drawing
 

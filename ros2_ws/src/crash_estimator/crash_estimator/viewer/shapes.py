@@ -78,7 +78,7 @@ def legend(pen: Pen, cast: Cast, length: float, force: float) -> None:
     bottom = lanes_height(cast) + 0.08
     shares = np.linspace(-1.0, 1.0, 41)
     x = 1.75 + 0.85 * shares
-    bar = [[(a, bottom), (b, bottom)] for a, b in zip(x[:-1], x[1:])]
+    bar = [[(a, bottom), (b, bottom)] for a, b in zip(x[:-1], x[1:], strict=True)]
     colors = force_colors(0.5 * (shares[:-1] + shares[1:]))
     pen.static(path("motion", "legend", "force"), rr.LineStrips2D(bar, colors=colors, radii=points(3.0)))
     unit, factor = cast.shown("N")

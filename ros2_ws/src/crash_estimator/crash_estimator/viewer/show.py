@@ -38,8 +38,8 @@ class Show:
         """activate: show this layout at once; otherwise whoever arranged the views anew keeps their arrangement.
 
         attempt: calls what may fail for one estimator and must not harm the others.
-        sent: the casts whose layouts its viewers have, to be added to: layouts hold for all recordings of a session, and
-        the server keeps each of them to the end.
+        sent: the casts whose layouts its viewers have, to be added to: layouts hold for all recordings of a session,
+        and the server keeps each of them to the end.
         """
         self.recording, self.activate, self.attempt = recording, activate, attempt
         self.sent = [] if sent is None else sent

@@ -37,8 +37,8 @@ READERS = (
 def read_source(path: str | Path, names: str | Path | None = None, **options: Any) -> Recording:
     """The recording at `path` (or of NHTSA's test `nhtsa:NUMBER`), in whichever format it is.
 
-    `options` that are None or False are not given. `names` is a YAML file that renames channels and sets bodies (see `description.Names`); without it,
-    `import.yaml` in the folder does. Raises RecordingError with one readable line.
+    `options` that are None or False are not given. `names` is a YAML file that renames channels and sets bodies (see
+    `description.Names`); without it, `import.yaml` in the folder does. Raises RecordingError with one readable line.
     """
     path = _folder_or_file(path)
     reader = _reader_for(path)

@@ -100,7 +100,7 @@ def make_layout(
     common = len(b.start)
     outputs = outputs_of(structure)
     offsets, modes = [], []
-    for r, record in enumerate(records):
+    for record in records:
         offsets.append(len(b.start))
         for q in range(len(outputs)):
             b.add("offset", 0.0, max(record.offset_std[q], 1e-9))
