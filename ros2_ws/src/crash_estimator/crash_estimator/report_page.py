@@ -31,7 +31,7 @@ from .page_html import html_page
 from .page_markdown import write_markdown_page
 from .report_figures import Result, column_of, equations_of, result_figures, time_of
 from .tables import error_table, parameter_table, unit_of
-from .validation_tables import comparison_table, covariance_table, whiteness_table
+from .validation_tables import comparison_table, correlation_table, covariance_table
 
 
 def write_report(  # noqa: PLR0913 - every option of the command
@@ -141,7 +141,7 @@ def _tables(results: dict[str, Result]) -> list[Block]:
     page += [Heading("The error (tables 5.4 and 6.1)")]
     for method, result in results.items():
         validation = result.validation
-        text = [error_table(validation.errors), covariance_table(validation), whiteness_table(validation)]
+        text = [error_table(validation.errors), covariance_table(validation), correlation_table(validation)]
         page += [Paragraph(method), Lines("\n\n".join(text))]
     return [*page, Paragraph("Cross-correlation of the error with the inputs, lag 0 (table 5.4):"), _cross(results)]
 

@@ -65,7 +65,7 @@ def tables(cast: Cast, name: str, one: Judged) -> str:
     for level in LEVELS:
         inside = [f"{e.auto.inside(level):.0%}" if e.auto else "–" for e in equations]
         lines.append(row(f"auto-correlation: lags within {level:.0%} limits", inside))
-    lines.append(row("white (Ljung and Box)", [_white(e) for e in equations]))
+    lines.append(row("uncorrelated (Ljung and Box)", [_uncorrelated(e) for e in equations]))
     lines.append(row("most alike / its 99 % limit", [_alike(e) for e in equations]))
     ratings = [runs[e.equation].rating if e.equation in runs else None for e in errors]
     lines.append(row("simulated freely: ISO/TS 18571", [f"{r.overall:.2f} {r.grade}" if r else "–" for r in ratings]))
@@ -78,8 +78,8 @@ def tables(cast: Cast, name: str, one: Judged) -> str:
     return "\n".join(lines)
 
 
-def _white(equation: EquationValidation) -> str:
-    return next((f"at {level:.0%}" for level in LEVELS if equation.white(level)), "no")
+def _uncorrelated(equation: EquationValidation) -> str:
+    return next((f"at {level:.0%}" for level in LEVELS if equation.uncorrelated(level)), "no")
 
 
 def _alike(equation: EquationValidation) -> str:
