@@ -2,6 +2,9 @@
 
 import subprocess
 import sys
+from pathlib import Path
+
+from crash_estimator.core import compile_cache
 
 USE = """
 import sys
@@ -51,3 +54,11 @@ def test_what_must_be_compiled_is_said_once():
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert said.count("\n") == 1 and said.startswith("compiling ")
+
+
+def test_compiled_code_is_renewed_after_a_change_of_what_it_is_made_of_and_of_nothing_else():
+    core = Path(compile_cache.__file__).parent
+    names = {str(path.relative_to(core)) for path in compile_cache.sources(core)}
+    assert {"compiled/kalman.py", "compiled/rls.py", "kinematics.py", "estimators/kalman.py", "estimate.py"} <= names
+    assert not names & {"validation.py", "methods.py", "structure.py", "compiled/estimator.py"}
+    assert all((core / name).is_file() for name in names)

@@ -6,6 +6,7 @@ files: after an update it would go on running old code. Import this before defin
 
 import hashlib
 import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,13 +14,19 @@ from pathlib import Path
 from numba import config
 from numba.core.event import Event, Listener, install_listener
 
-INDEPENDENT = {"diagnosis", "effects"}
-"""Folders of the core that the compiled recursion takes nothing from."""
+
+def sources(core: Path) -> list[Path]:
+    """The files of the compiled recursion, and those that it takes constants from: after any other change the code that
+    is there goes on being used. (The compiled functions elsewhere, of diagnosis and effects, take nothing from others.)
+    """
+    texts = {file: file.read_text() for file in sorted((core / "compiled").glob("*.py"))}
+    compiled = [file for file, text in texts.items() if "@njit" in text]
+    names = {name for file in compiled for name in re.findall(r"^from \.\.([\w.]+) import", texts[file], re.MULTILINE)}
+    return [*compiled, *(core.joinpath(*name.split(".")).with_suffix(".py") for name in sorted(names))]
 
 
-def _fingerprint(folder: Path) -> str:
-    sources = sorted(path for path in folder.rglob("*.py") if not INDEPENDENT & set(path.relative_to(folder).parts))
-    return hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
+def _fingerprint(core: Path) -> str:
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sources(core))).hexdigest()[:16]
 
 
 _cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "crash_estimator"
