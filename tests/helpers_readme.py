@@ -8,7 +8,10 @@ from helpers_domain import own_domain
 from helpers_paths import DATA, ROOT
 
 README = (ROOT / "README.md").read_text()
-COMMANDS = [line for block in re.findall(r"```sh\n(.*?)```", README, re.S) for line in block.splitlines() if line]
+BLOCKS = [[line for line in block.splitlines() if line] for block in re.findall(r"```sh\n(.*?)```", README, re.S)]
+COMMANDS = [line for block in BLOCKS for line in block]
+(EXAMPLE,) = [block for block in BLOCKS if any("crash_examples" in line for line in block)]
+"""Estimator, example and replay in three terminals."""
 
 
 FETCHED = {"nhtsa:10146": DATA / "nhtsa-10146"}

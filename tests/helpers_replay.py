@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from threading import Thread
 
 import numpy as np
@@ -50,10 +51,13 @@ def environment() -> dict[str, str]:
 class Replay:
     """`replay` on a bag, with its output; ended with the test."""
 
-    def __init__(self, bag=None, **parameters):
+    def __init__(self, bag=None, remap: Sequence[str] = (), **parameters):
+        """remap: such as __ns:=/sled_a."""
         command = [sys.executable, "-m", "crash_replay.replay_node", "--ros-args"]
+        command += [word for rule in remap for word in ("-r", rule)]
         for name, value in {**({"bag": bag} if bag else {}), **parameters}.items():
-            command += ["-p", f"{name}:={str(value).lower() if isinstance(value, bool) else value}"]
+            shown = [str(one) for one in value] if isinstance(value, list) else value
+            command += ["-p", f"{name}:={str(shown).lower() if isinstance(shown, bool) else shown}"]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
         self.process = subprocess.Popen(command, env=environment(), text=True, **pipes)
 
@@ -79,11 +83,11 @@ class Replay:
 class Listener:
     """Hears the replay's `test`, `samples` and `replay_state`; takes nothing for `stall` s after the first sample."""
 
-    def __init__(self, name: str = "listener", stall: float = 0.0):
+    def __init__(self, name: str = "listener", stall: float = 0.0, namespace: str = ""):
         prepare_middleware()
         self.context = Context()
         rclpy.init(context=self.context, domain_id=DOMAIN)
-        self.node = Node(name, context=self.context, start_parameter_services=False)
+        self.node = Node(name, namespace=namespace, context=self.context, start_parameter_services=False)
         self.tests: list[TestInfo] = []
         self.messages: list[Samples] = []
         self.states: list[ReplayState] = []

@@ -4,6 +4,9 @@ Cab 1300 kg, engine 400 kg, 16 m/s. Springs cab-barrier, engine-barrier and cab-
 tension; integrated here with the explicit midpoint rule. An "estimator" is the truth with an error that dies away.
 """
 
+import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import NamedTuple
@@ -12,6 +15,7 @@ import numpy as np
 from helpers_waiting import PATIENCE
 from rerun.chunk import RrdReader
 
+from crash_estimator.core.estimate import ParameterStatus
 from crash_estimator.viewer.blocks import Block, EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock
 from crash_estimator.viewer.recorder import Recorder
 from crash_estimator.viewer.sinks import Sinks
@@ -149,6 +153,18 @@ def two_streams(crash: Crash, size: int = 50) -> dict[str, list[Block]]:
     return {name: estimates(crash, name, error, size=size, seed=seed) for name, error, seed in settings}
 
 
+def with_damping(block: ParameterBlock) -> ParameterBlock:
+    """None, which is known."""
+    none = np.zeros((len(block.time_ns), len(ELEMENTS)))
+    return block._replace(
+        name=(*block.name, *(f"{element}.damping" for element in ELEMENTS)),
+        unit=(*block.unit, *["N*s/m"] * len(ELEMENTS)),
+        value=np.hstack([block.value, none]),
+        std=np.hstack([block.std, none]),
+        status=np.hstack([block.status, np.full(none.shape, ParameterStatus.KNOWN, np.uint8)]),
+    )
+
+
 def recorder(rrd: Path | str, **settings) -> Recorder:
     """A recorder that expects both estimators, its server on a free port."""
     return Recorder(Sinks(0, rrd), NAMES, **settings)
@@ -209,3 +225,11 @@ def series(path: Path, entity: str, component: str) -> tuple[np.ndarray, np.ndar
     """Times (n,) and values (n, width) of a component whose rows are alike."""
     times, values = column(path, entity, component)
     return times, np.array(values)
+
+
+def start_viewer(rrd: Path | str, **parameters: str) -> subprocess.Popen:
+    """The node, in a process of its own."""
+    command = [sys.executable, "-m", "crash_estimator.nodes.viewer_node", "--ros-args", "-p", f"rrd:={rrd}"]
+    for name, value in {"port": 0, "open": "false", **parameters}.items():
+        command += ["-p", f"{name}:={value}"]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=dict(os.environ))

@@ -78,7 +78,7 @@ def _every_view_has_data(rrd: Path, total: int) -> None:
     for origin in origins:
         inside = {path: n for path, n in counts.items() if path == origin or path.startswith(f"{origin}/")}
         assert inside, f"view of {origin} is empty"
-        if origin == "/summary" or origin.startswith("/validation/"):
+        if origin in ("/summary", "/state") or origin.startswith("/validation/"):
             continue
         for name in ESTIMATORS:
             own = [n for path, n in inside.items() if name in path.split("/")]
@@ -91,7 +91,7 @@ def _curves_can_be_seen(rrd: Path) -> None:
     """The curves' own colours in the picture of the first tab: measured in the plots, both estimators as well."""
     from PIL import Image
 
-    from crash_estimator.viewer.cast import ESTIMATOR_COLORS, MEASURED
+    from crash_estimator.viewer.colors import ESTIMATOR_COLORS, MEASURED
     from crash_estimator.viewer.screenshot import ScreenshotError, screenshot
 
     png = rrd.with_suffix(".png")

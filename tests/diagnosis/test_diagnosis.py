@@ -8,7 +8,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from crash_estimator.core.diagnosis.observation.record import observe
-from crash_estimator.core.diagnosis.observation.sensor_noise import sensor_noise
 from crash_estimator.core.diagnosis.output_error.normal_equations import may_diverge
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 from crash_estimator.core.diagnosis.report.diagnosis import Diagnosis, diagnose
@@ -17,6 +16,7 @@ from crash_estimator.core.diagnosis.selection.candidates import candidates
 from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
 from crash_estimator.core.diagnosis.selection.score_screening import screen
 from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.sensor_noise import sensor_noise
 from crash_estimator.core.structure import EffectSpec, ModelError, Structure
 from crash_estimator.model_file import ModelFile
 from crash_replay.recording import Recording, RecordingError

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from crash_msgs.msg import ReplayState
 from crash_msgs.srv import Burst, GetEstimates, Seek, SetRate, Step
 from helpers_estimator_node import joined
 from helpers_paths import BAGS
@@ -12,6 +13,7 @@ from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.model_file import load_model
 from crash_replay.bag import read_bag
+from crash_replay.qos import LATCHED
 from crash_replay.ros_messages import stamp_ns
 
 BAG = BAGS / "frontal_engine_cab.mcap"
@@ -140,3 +142,28 @@ def test_killed_and_started_again_it_goes_on_as_if_nothing_had_been(stage, recor
     state = victim["state"][-1]  # latched: known to those who have found the new one late
     assert before + 200 <= state.number and state.asked_again == state.number
     assert (state.holds_from, state.missed) == (0, 0)
+
+
+def test_a_replay_of_another_name_is_asked_by_its_own(stage, recording, whole):
+    """It says of itself who it is; nobody has to be told."""
+    stage.node.create_subscription(ReplayState, "replay_state", stage.replayed.append, LATCHED)
+    stage.start("crash_replay.replay_node", "player", bag=BAG, block=100, rate=1000.0, keep_alive=True)
+    finished = lambda: stage.replayed and stage.replayed[-1].state == ReplayState.FINISHED  # noqa: E731
+    stage.spin_until(finished, "the replay is over")
+    stage.add_estimator("late", model=MODEL, method="mrls")
+    said = lambda: stage.heard["late"]["parameters"]  # noqa: E731
+    stage.spin_until(lambda: said() and numbers(said())[-1] == len(recording) - 1, "it has asked for all of it")
+    again = stage.call(GetEstimates, "late/get_estimates", start=0, stop=100)
+    assert again.success
+    assert_exact([again.parameters], whole["mrls"])
+    assert_exact(said(), whole["mrls"])
+
+
+def test_several_recordings_in_turn_are_each_estimated_from_the_start(stage, recording, whole):
+    stage.add_estimator("mrls", model=MODEL, method="mrls")
+    stage.start("crash_replay.replay_node", bag=BAG, then=f"[{BAG}]", rate=2.0, listeners="[mrls]", wait_timeout=100.0)
+    said = stage.heard["mrls"]["parameters"]
+    twice = list(range(len(recording))) * 2
+    stage.spin_until(lambda: len(numbers(said)) == len(twice), "both are estimated")
+    assert numbers(said) == twice
+    assert_exact(said, whole["mrls"])

@@ -80,8 +80,8 @@ def test_who_waits_for_an_answer_has_heard_the_forces_before(stage, model, recor
 
 
 def test_several_side_by_side_each_with_its_method_and_settings(stage, model, recording):
-    stage.add_estimator("slow", model=model, method="rls", settings=["forgetting=0.999"])
-    stage.add_estimator("fast", model=model, method="rls", settings=["forgetting=0.9"])
+    stage.add_estimator("slow", model=model, method="rls", **{"settings.forgetting": 0.999})
+    stage.add_estimator("fast", model=model, method="rls", **{"settings.forgetting": 0.9})
     stage.add_estimator("filter", model=model, method="constrained_kalman")
     stage.send_test(recording)
     stage.send(recording, block=10)
@@ -265,10 +265,11 @@ def test_parameters_that_are_not_finite_are_never_published(stage, model, record
     [
         ([], "parameter model is not set"),
         (["-p", "model:=side_dumy"], "did you mean 'side_dummy'"),
-        (["-p", "model:=side_dummy", "-p", "settings:=['forgetting']"], "a setting is written NAME=NUMBER"),
-        (["-p", "model:=side_dummy", "-p", "settings:=forgetting"], "a setting is written NAME=NUMBER"),
-        (["-p", "model:=side_dummy", "-p", "method:=krls"], "there is no method 'krls'"),
-        (["-p", "model:=side_dummy", "-p", "settings:=['forgeting=0.9']"], "no setting 'forgeting'"),
+        (["-p", "model:=side_dummy", "-p", "method:=krls"], "parameter method must be rls, mrls"),
+        (["-p", "model:=side_dummy", "-p", "settings:=['forgetting=0.9']"], "there is no parameter settings: "),
+        (["-p", "method:=rls", "-p", "settings.forgeting:=0.9"], "did you mean settings.forgetting?"),
+        (["-p", "method:=rls", "-p", "settings.forgetting:=1.1"], "settings.forgetting must be a number from 0 to 1,"),
+        (["-p", "method:=kalman", "-p", "settings.forgetting:=0.9"], "there is no parameter settings.forgetting"),
     ],
 )
 def test_what_cannot_work_on_any_test_ends_the_node_with_one_line(arguments, complaint):

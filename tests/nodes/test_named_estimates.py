@@ -45,13 +45,15 @@ def listen(stage: Stage, name: str) -> dict[str, list]:
 
 
 @pytest.mark.parametrize(
-    "method, settings", [("constrained_kalman", []), ("gauss_newton", ["p=1", "q=1", "memory=0.05"])]
+    "method, settings",
+    [
+        ("constrained_kalman", {}),
+        ("gauss_newton", {"settings.p": 1, "settings.q": 1, "settings.memory": 0.05}),
+    ],
 )
 @pytest.mark.parametrize("block", [1, 7])
 def test_they_are_those_of_the_blocks_to_the_last_bit(stage, model, recording, method, settings, block):
-    node = stage.add_estimator(
-        "one", model=model, method=method, settings=settings or [""], value_topics=["spring.stiffness"]
-    )
+    node = stage.add_estimator("one", model=model, method=method, value_topics=["spring.stiffness"], **settings)
     stage.send_test(recording)
     stage.spin_until(lambda: node.follower, "the test has come")
     named = listen(stage, "one")

@@ -11,6 +11,7 @@ from helpers_domain import own_domain
 from numpy.testing import assert_allclose
 
 from crash_estimator.benchmarks.speed_growth import growth
+from crash_estimator.benchmarks.speed_page import renewed_page, whole_page
 from crash_estimator.benchmarks.speed_recordings import chain, ringing
 from crash_estimator.benchmarks.speed_reference import Compiled, Problem, filterpy_step, regressions
 from crash_estimator.benchmarks.speed_row import Row
@@ -100,14 +101,27 @@ def test_a_row_says_whether_its_reach_is_held():
     assert Row("a", "1", "2", 1.6, 1.5, least=False).held == "no" and Row("a", "1", "2", 0.5).held == ""
 
 
+def test_rows_that_are_measured_again_take_their_place_in_the_page():
+    rows = [Row("a", "1 us", "2 us", 0.5, 1.0), Row("b", "3 us")]
+    page = "\n".join(whole_page(rows, load=0.1))
+    again = "\n".join(renewed_page(page, [Row("b", "4 us"), Row("c", "5 us")], load=2.5))
+    table = [line for line in again.splitlines() if line.startswith("|")]
+    firsts = [line.split(" | ")[:2] for line in table[2:]]
+    assert firsts == [["| a", "1 us"], ["| b", "4 us"], ["| c", "5 us"]]
+    assert again.startswith(page[: page.index("| b")])
+    assert "load 2.5 before it began: *b*; *c*." in again
+
+
 def test_the_command_runs(tmp_path):
     """The rows that need the graph, as short as may be; the others are run above."""
     command = [sys.executable, "-m", "crash_estimator.benchmarks.speed", "--quick", "--to", str(tmp_path), "--only"]
     with tempfile.TemporaryDirectory() as home:
         environment = os.environ | {"ROS_LOG_DIR": home, "ROS_DOMAIN_ID": str(own_domain())}
-        done = subprocess.run([*command, "latency", "real_time"], capture_output=True, text=True, env=environment)
+        parts = ("latency", "named", "real_time")
+        done = subprocess.run([*command, *parts], capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
     rows = done.stdout.splitlines()[2:]
-    assert len(rows) == 3 and "bare relay" in rows[0] and " 0 lost" in rows[2], done.stdout
+    assert len(rows) == 5 and "bare relay" in rows[0] and " 0 lost" in rows[4], done.stdout
+    assert "a block of one" in rows[2] and "to blocks alone" in rows[3]
     assert " inf " not in done.stdout and " nan " not in done.stdout, "some samples had no answer"
     assert not list(tmp_path.iterdir())  # some of the rows make no page

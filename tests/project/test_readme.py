@@ -3,21 +3,29 @@
 import json
 import re
 import shlex
+import shutil
 import subprocess
 
 import numpy as np
 import pytest
 from conftest import NEEDS_A_GRAPH
 from helpers_paths import ROOT
-from helpers_readme import COMMANDS, README, environment, needs_data
+from helpers_readme import COMMANDS, EXAMPLE, README, environment, needs_data
 from numpy.testing import assert_allclose
+from rclpy.serialization import serialize_message
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from crash_replay.bag import read_bag, time_zero_ns
+from crash_replay.message_types import encode_test, typestore
+from crash_replay.ros_messages import samples_to_msg
 
 NODES = ("crash_estimator viewer", "crash_estimator estimator", "crash_replay record")
-LISTENING = [c for c in COMMANDS if any(node in c for node in NODES)]
-REPLAY = [c for c in COMMANDS if "crash_replay replay" in c]
+LISTENING = [c for c in COMMANDS if any(node in c for node in NODES) and c not in EXAMPLE]
+REPLAY = [c for c in COMMANDS if "crash_replay replay" in c and c not in EXAMPLE]
 THREE = [c for c in COMMANDS if "hidden_effect" in c and "--effects" not in c]
 MAKE = [c for c in COMMANDS if c.startswith("make ")]  # test_readme_demo, and this
-ALONE = [c for c in COMMANDS if c not in (*MAKE, *LISTENING, *REPLAY, *THREE)]
+NAMESPACED = [line.strip() for line in README.splitlines() if line.startswith("    tools/run") and "__ns:=" in line]
+ALONE = [c for c in COMMANDS if c not in (*MAKE, *LISTENING, *REPLAY, *THREE, *EXAMPLE)]
 
 
 def test_the_first_two_commands_do_everything():
@@ -81,13 +89,54 @@ def test_the_nodes_find_each_other(tmp_path):
     assert all(file.stat().st_size > 100_000 for file in written)
 
 
+def test_sleds_in_namespaces_are_replayed_side_by_side():
+    estimators = [c for c in NAMESPACED if "crash_estimator estimator" in c]
+    replays = [f"{c} -p wait_timeout:=120.0" for c in NAMESPACED if "crash_replay replay" in c]
+    assert len(estimators) == len(replays) == 2
+    piped = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    together = {"cwd": ROOT, "env": environment(), **piped}
+    nodes = {c: subprocess.Popen(shlex.split(c), **together) for c in (*estimators, *replays)}
+    said = {c: nodes[c].communicate(timeout=200)[0] for c in replays}
+    for c in estimators:
+        nodes[c].terminate()
+    said |= {c: nodes[c].communicate(timeout=60)[0] for c in estimators}
+    assert all(node.returncode == 0 for node in nodes.values()), said
+    assert ["1201 samples sent" in said[replays[0]], "1901 samples sent" in said[replays[1]]] == [True, True], said
+
+
+def test_the_composed_form_replays_to_both_its_estimators():
+    (command,) = [line.strip() for line in README.splitlines() if "crash_estimator composed kalman" in line]
+    wait = " -p replay:wait_timeout:=120.0"
+    ends = {"capture_output": True, "text": True, "timeout": 200}
+    done = subprocess.run(shlex.split(command + wait), cwd=ROOT, env=environment(), **ends)
+    assert (done.returncode, "1201 samples sent" in done.stdout) == (0, True), done.stdout + done.stderr
+    assert all(f"[{name}]: test side_dummy_padded" in done.stdout + done.stderr for name in ("kalman", "quick"))
+
+
+def test_what_rosbag2_has_recorded_of_test_and_samples_is_replayed():
+    (command,) = [line.strip() for line in README.splitlines() if "bag:=out/rosbag2" in line]
+    recording, folder = read_bag(ROOT / "bags/frontal_engine_cab.mcap"), ROOT / "out/rosbag2"
+    shutil.rmtree(folder, ignore_errors=True)
+    zero = time_zero_ns(recording)
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topics = {"/test": "crash_msgs/msg/TestInfo", "/samples": "crash_msgs/msg/Samples"}
+        test, samples = (writer.add_connection(t, kind, typestore=typestore()) for t, kind in topics.items())
+        writer.write(test, zero, encode_test(recording, zero))
+        for number in range(len(recording)):
+            message = samples_to_msg(recording, number, number + 1, 0, zero)
+            writer.write(samples, zero + recording.time_ns.item(number), serialize_message(message))
+    ends = {"capture_output": True, "text": True, "timeout": 100}
+    done = subprocess.run(shlex.split(command), cwd=ROOT, env=environment(), **ends)
+    assert done.returncode == 0 and f"{len(recording)} samples sent" in done.stdout, done.stdout + done.stderr
+
+
 @pytest.mark.parametrize("name", sorted(set(re.findall(r"`(ros2_ws/src/[\w/]+|bags/[\w.]+)`", README))))
 def test_every_path_that_is_named_is_there(name):
     assert (ROOT / name).exists()
 
 
 def test_the_effect_that_is_shown_is_the_file_and_stands_in_the_ranking():
-    (shown,) = re.findall(r"```python\n(.*?)```", README, re.S)
+    (shown,) = [code for code in re.findall(r"```python\n(.*?)```", README, re.S) if "EFFECT" in code]
     assert shown == (ROOT / "docs/position_damping.py").read_text() and shown.count("\n") <= 20
     (command,) = [c for c in COMMANDS if "--effects" in c]
     found = ROOT / "out/own.json"

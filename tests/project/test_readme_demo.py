@@ -38,6 +38,10 @@ def simulated() -> str:
     return said_by(SIMULATED)
 
 
+def test_without_a_display_it_says_where_a_browser_finds_it(simulated):
+    assert re.search(r"in a browser on this machine: http://127\.0\.0\.1:\d+/\?url=rerun", simulated), simulated
+
+
 STORY = (
     "all samples: effect missing", "where it fails: rib, loading", "what it lacks: coulomb_friction on rib_spine",
     "the error falls", "verdict with it: adequate",
@@ -70,6 +74,9 @@ def test_every_view_of_the_diagnosis_has_data(simulated):
     assert wanted <= origins
     for origin in wanted:
         assert any(path.startswith(f"{origin}/") and n for path, n in counts.items()), f"view of {origin} is empty"
+    for kind in ("signal", "residual", "innovation"):
+        names = [f"/{kind}/rib/{part}/hidden_effect" for part in ("model", "revision\\ 01")]
+        assert all(counts[name] >= 1401 for name in names), f"{kind}: as given, and with what was added"
     assert counts["/revision/rib/whole/model/00"] == counts["/revision/rib/whole/model/01"] > 0.6 * 1401
 
 

@@ -24,6 +24,7 @@ from crash_replay.keys import decode, next_rate
         (b"\x1bOC", ["right"]),
         (b"\x1b[1;2C", ["shift+right"]),
         (b"\x1b[H\x1b[F", ["home", "end"]),  # as xterm sends them,
+        (b"\x1bOH\x1bOF", ["home", "end"]),  # and where a program has asked for application keys,
         (b"\x1b[1~\x1b[4~", ["home", "end"]),  # as tmux and screen do,
         (b"\x1b[7~\x1b[8~", ["home", "end"]),  # as rxvt does
         (b"\x1b[15~7", ["7"]),  # F5 means nothing

@@ -1,49 +1,18 @@
 """What ports listen where: on the loopback interface only, however a node is started; elsewhere only if told to."""
 
-import ipaddress
 import os
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
-from helpers_nodes import BAG, MODULES, end, environment, executable, family, node, parameters
+from helpers_nodes import BAG, MODULES, end, environment, executable, node, parameters
+from helpers_ports import bound, elsewhere
 from helpers_waiting import PATIENCE
 
 PORTS_OF_A_NODE = 4  # UDP: discovery, data, another one of Fast DDS, and the one that it sends from
-
-
-def bound(process: int) -> set[tuple[str, str, int]]:
-    """(protocol, address, port) of every socket of the process and its children that takes what comes from outside."""
-    inodes = set()
-    for one in family(process):
-        for descriptor in Path(f"/proc/{one}/fd").glob("*"):
-            try:
-                inodes.add(os.readlink(descriptor))
-            except OSError:
-                continue  # closed meanwhile
-    found = set()
-    for protocol in ("udp", "udp6", "tcp", "tcp6"):
-        for line in Path(f"/proc/net/{protocol}").read_text().splitlines()[1:]:
-            _, local, _, state, *_, inode = line.split()[:10]
-            listens = not protocol.startswith("tcp") or state == "0A"
-            if listens and f"socket:[{inode}]" in inodes:
-                address, port = local.split(":")
-                found.add((protocol, str(ip_address(address)), int(port, 16)))
-    return found
-
-
-def ip_address(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address:
-    """As /proc/net writes it: words of 32 bits in the machine's own order of bytes."""
-    words = [int(text[k : k + 8], 16).to_bytes(4, sys.byteorder) for k in range(0, len(text), 8)]
-    return ipaddress.ip_address(b"".join(words))
-
-
-def elsewhere(sockets: set[tuple[str, str, int]]) -> set[tuple[str, str, int]]:
-    return {one for one in sockets if not ipaddress.ip_address(one[1]).is_loopback}
 
 
 def watched(command: list[str], given: dict[str, str], enough: Callable, seconds: float = 1.0) -> set:

@@ -53,6 +53,7 @@ def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path, monkeypatch,
         (["to:=e.mcap", "wait_for:=-1"], "wait_for"),
         (["to:=e.bag"], "must be a file that ends in .mcap, got 'e.bag'"),
         (["to:=e.mcap", "topics:=5"], "parameter topics must be a list of names, got 5"),
+        (["to:=e.mcap", "regex:='('"], "parameter regex must be a regular expression, got '('"),
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(tmp_path, parameters, said):
@@ -104,7 +105,9 @@ def test_it_records_the_topics_that_are_asked_for(bag, tmp_path):
     with Record(file, **chosen) as record, Replay(bag, rate=0.05, wait_for=1, wait_timeout=PATIENCE) as replay:
         assert replay.end()[0] == 0
         assert record.end()[0] == 0
-    assert messages(file) == {"/test": 1, "/samples": 40, "/channels/rib_ay": 40, "/clock": 40}
+    found = messages(file)
+    assert found.pop("/clock") >= 40
+    assert found == {"/test": 1, "/samples": 40, "/channels/rib_ay": 40}
 
 
 def test_what_was_not_replayed_is_missing_and_the_status_says_so(bag, tmp_path):

@@ -41,6 +41,26 @@ def test_channels_are_chosen_by_name_and_pattern():
     np.testing.assert_array_equal(chosen.values[:, 1], recording.column("barrier_fx"))
 
 
+def test_channels_are_chosen_by_regular_expressions_too():
+    recording = some_recording()
+    by_both = select_channels(recording, ["barrier_fx"], regex="^rib_.y$", exclude_regex="v")
+    assert by_both.test.channel_names == ("rib_ay", "barrier_fx")
+    assert select_channels(recording, regex="head|neck").test.channel_names == ("neck_mz", "head_wx")
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"regex": "rib_("}, r"parameter regex must be a regular expression, got 'rib_\('"),
+        ({"exclude_regex": "door"}, "parameter exclude_regex: 'door' is found in no channel's name: there are rib_ay"),
+        ({"exclude_regex": "_"}, "no channel is left of what is chosen"),
+    ],
+)
+def test_a_regular_expression_that_leaves_nothing_is_an_error(given, said):
+    with pytest.raises(SelectionError, match=said):
+        select_channels(some_recording(), **given)
+
+
 def test_all_channels_leave_the_recording_as_it_is():
     recording = some_recording()
     assert select_channels(recording) is recording

@@ -7,7 +7,7 @@ import helpers_viewer as crash_data
 import numpy as np
 import pytest
 from helpers_findings import ADDED, candidate, ranking, revision, story
-from helpers_viewer import NAMES, column, feed, recorder, rows, series, settle, values_of
+from helpers_viewer import NAMES, column, feed, recorder, rows, series, settle, values_of, with_damping
 from numpy.testing import assert_allclose
 from rerun.blueprint.api import Container, View
 from rerun.chunk import RrdReader
@@ -18,8 +18,9 @@ from crash_estimator.model_file import load_model
 from crash_estimator.viewer import layout, validation
 from crash_estimator.viewer.blocks import Block, ForceBlock, ParameterBlock, ResidualBlock, join
 from crash_estimator.viewer.cast import Cast, member
+from crash_estimator.viewer.colors import CONFOUNDED, LIMIT_COLORS, TOLD, WEAK
 from crash_estimator.viewer.judged import Jury, describe, estimates_of, judge
-from crash_estimator.viewer.ranking import CONFOUNDED, LEFT, TOLD, WEAK, color_of, ranking_drawing, revision_color
+from crash_estimator.viewer.ranking import LEFT, color_of, ranking_drawing, revision_color
 from crash_estimator.viewer.revisions import LAGS, whiteness_drawing
 
 G = 9.80665
@@ -49,18 +50,6 @@ def streams(crash) -> dict[str, list[Block]]:
     return streams
 
 
-def with_damping(block: ParameterBlock) -> ParameterBlock:
-    """None, which is known."""
-    none = np.zeros((len(block.time_ns), len(crash_data.ELEMENTS)))
-    return block._replace(
-        name=(*block.name, *(f"{element}.damping" for element in crash_data.ELEMENTS)),
-        unit=(*block.unit, *["N*s/m"] * len(crash_data.ELEMENTS)),
-        value=np.hstack([block.value, none]),
-        std=np.hstack([block.std, none]),
-        status=np.hstack([block.status, np.full(none.shape, ParameterStatus.KNOWN, np.uint8)]),
-    )
-
-
 def with_weights(block: ParameterBlock) -> ParameterBlock:
     """Of a bank of two models, and when the first has jumped."""
     n = len(block.time_ns)
@@ -79,7 +68,8 @@ def with_weights(block: ParameterBlock) -> ParameterBlock:
 def rrd(crash, streams, structure, tmp_path_factory) -> Path:
     """Both estimators and a diagnosis."""
     path = tmp_path_factory.mktemp("missing") / "crash.rrd"
-    target = recorder(path, structure_of=lambda name: structure if name == structure.name else None, say=pytest.fail)
+    known = {structure.name: structure}
+    target = recorder(path, say=pytest.fail, structure_of=lambda estimator, revision, model: known.get(model))
     findings = story(crash)
     target.put(lambda: findings[0])  # before the first estimator is known
     feed(target, crash, streams)
@@ -220,10 +210,10 @@ class TestValidation:
         assert_allclose(judged.validation.covariance, expected.covariance)
         assert {e.equation for e in judged.validation.equations} == {"cab", "engine", "barrier"}
         assert judged.simulated is not None and len(judged.comparisons) == 5
-        jury = Jury(lambda name: structure)
+        jury = Jury(lambda estimator, revision, model: structure)
         for block in (b for stream in streams.values() for b in stream):
             jury.hear(block)
-        assert set(jury.verdicts()) == set(NAMES)
+        assert set(jury.verdicts(NAMES)) == set(NAMES)
         assert judge(load_model("frontal_single"), blocks) is None, "of another model"
 
     def test_tables_and_limits(self, cast, streams, structure):
@@ -233,8 +223,8 @@ class TestValidation:
         assert "auto-correlation: lags within 95% limits" in text and "ISO/TS 18571" in text
         cross = judged.validation.equations[0].cross["cab_barrier.crush"]
         drawing = validation.correlation_drawing(cast, {NAMES[0]: cross})
-        for level, color in zip((0.90, 0.95, 0.99), validation.LIMIT_COLORS, strict=True):
-            lines = [s for s, c in zip(drawing.strips, drawing.strip_colors, strict=True) if c == color]
+        for level, color in zip((0.90, 0.95, 0.99), LIMIT_COLORS):
+            lines = [s for s, c in zip(drawing.strips, drawing.strip_colors) if c == color]
             drawn = sorted({round((-strip[0][1] - 0.45) / 0.45, 9) for strip in lines})
             limit = round(cross.limit(level), 9)
             assert drawn == ([-limit, limit] if limit <= 1 else [])

@@ -1,9 +1,7 @@
 """The viewer node in a process of its own: what estimators publish is in its file, however it is ended."""
 
-import os
 import signal
 import subprocess
-import sys
 import time
 from array import array
 from collections.abc import Callable, Iterator
@@ -15,6 +13,7 @@ import pytest
 import rclpy
 from crash_msgs import msg
 from helpers_domain import own_domain
+from helpers_viewer import start_viewer as start
 from helpers_waiting import PATIENCE
 from numpy.testing import assert_array_equal
 from rclpy.node import Node
@@ -108,13 +107,6 @@ def crash() -> crash_data.Crash:
 @pytest.fixture(scope="module")
 def streams(crash) -> dict[str, list[Block]]:
     return {name: crash_data.estimates(crash, name, size=1, seed=k) for k, name in enumerate(NAMES)}
-
-
-def start(rrd: Path | str, **parameters: str) -> subprocess.Popen:
-    command = [sys.executable, "-m", "crash_estimator.nodes.viewer_node", "--ros-args", "-p", f"rrd:={rrd}"]
-    for name, value in {"port": 0, "open": "false", **parameters}.items():
-        command += ["-p", f"{name}:={value}"]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
 
 
 def end(viewer: subprocess.Popen, timeout: float, status: int = 0) -> tuple[str, str]:

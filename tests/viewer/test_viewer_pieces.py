@@ -1,16 +1,25 @@
 """The pieces that the viewer's drawings are made of: axes, figures, blocks, limits, names."""
 
+import math
+
 import numpy as np
 import pytest
+import rerun.blueprint as rrb
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.viewer import cast as cast_module
+from crash_estimator.viewer import colors, layout
 from crash_estimator.viewer.axes import axis_for, round_up, text
 from crash_estimator.viewer.blocks import EventBlock, ForceBlock, ParameterBlock, ResidualBlock, join
-from crash_estimator.viewer.cast import ESTIMATOR_COLORS, Cast
+from crash_estimator.viewer.cast import Cast
+from crash_estimator.viewer.colors import ESTIMATOR_COLORS
 from crash_estimator.viewer.frames import FRAMES, frame_ends
 from crash_estimator.viewer.plausible import PARAMETER, PREDICTION, Limits
+from crash_estimator.viewer.readable import plots, time_range, value_range
 from crash_estimator.viewer.schematic import schematic
+from crash_estimator.viewer.shapes import force_colors, force_scale
 from crash_estimator.viewer.states import States
 from crash_estimator.viewer.summary import with_std
 
@@ -146,3 +155,79 @@ def test_only_the_first_event_of_a_stretch_is_listed():
 )
 def test_values_are_written_to_the_first_digit_of_their_sigma(value, std, written):
     assert with_std(value, std) == written
+
+
+@given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6), st.floats(3.5, 30.0))
+def test_a_value_axis_holds_its_lines_and_two_numbers(low, length, most):
+    """Whatever is drawn, and however small the plot: never 0 alone."""
+    high = low + length
+    first, last = value_range(low, high, most)
+    assert first <= low and high <= last
+    steps = [10.0**k for k in range(-6, 9)]
+    written = [numbers(first, last, step) for step in steps if (last - first) / step <= 1.1 * most]
+    assert max(written) >= 2, (first, last)
+
+
+def numbers(low: float, high: float, step: float) -> int:
+    return math.floor(high / step + 1e-6) - math.ceil(low / step - 1e-6) + 1
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "most", "expected"),
+    [
+        (-24.0, 37.0, 8.0, (-26.44, 39.44)),  # 10 g a step
+        (-4.6, 5.0, 8.0, (-4.984, 10.5)),  # too many of 1 g: up to 10 g, not down as well
+        (0.0, 450.0, 4.0, (-18.0, 1050.0)),
+    ],
+)
+def test_a_value_axis_is_no_longer_than_it_must(low, high, most, expected):
+    assert_allclose(value_range(low, high, most), expected)
+
+
+@pytest.mark.parametrize(
+    ("end", "width", "shown"),
+    [
+        (0.09, 420.0, 0.107),  # 10 ms have no room: up to 100 ms
+        (0.09, 800.0, 0.09),
+        (0.05, 420.0, 0.05),
+        (0.15, 420.0, 0.15),  # 100 ms is there
+        (0.5, 420.0, 0.5),
+    ],
+)
+def test_a_time_axis_has_two_numbers_in_the_narrowest_plot(end, width, shown):
+    assert_allclose(time_range((-0.05, end), width), (max(-0.05, -0.1 * end), shown))
+    assert time_range((-0.05, -0.01), width) is None, "no impact: as Rerun shows it"
+
+
+def test_every_time_plot_of_the_layout_is_linked_and_found(cast):
+    every = rrb.Tabs(*layout.tabs(cast))
+    found = list(plots(every))
+    assert {str(plot.view.origin) for plot in found} >= {"/signal/cab", "/residual/barrier", "/innovation/engine"}
+    assert all(100.0 < plot.width < 1600.0 and 60.0 < plot.height < 760.0 for plot in found)
+    assert all(plot.view.properties["TimeAxis"].link is not None for plot in found)
+
+
+def test_colours_can_be_told_from_a_dark_ground_and_from_a_white_one():
+    told = [value for name, value in vars(colors).items() if name[0].isupper() and name.isupper() and name != "GRID"]
+    every = [one for value in told for one in ([value] if isinstance(value[0], int) else value)]
+    assert len(every) > 20
+    for color in every:
+        for ground in ((13, 13, 14), (255, 255, 255)):
+            assert contrast(color, ground) >= 3.0, (color, ground)
+
+
+def contrast(a: tuple[int, int, int], b: tuple[int, int, int]) -> float:
+    """WCAG 2.1's ratio."""
+    light, dark = sorted((luminance(a), luminance(b)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def luminance(color: tuple[int, int, int]) -> float:
+    linear = [c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in (v / 255 for v in color)]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def test_forces_are_coloured_by_a_scale_that_fits_them():
+    assert [force_scale(value) for value in (3.9e3, 23.1e3, 50e3, 51e3, 0.7)] == [4e3, 25e3, 50e3, 60e3, 0.8]
+    none, some = force_colors(np.array([0.0, -4.1 / 25.0])).astype(int)
+    assert np.abs(some - none).max() > 40, "a sixth of the largest force is no longer grey"

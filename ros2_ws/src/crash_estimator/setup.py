@@ -15,6 +15,7 @@ setup(
     ],
     entry_points={
         "console_scripts": [
+            "composed = crash_estimator.nodes.composed_command:main",
             "demo = crash_estimator.demo.command:main",
             "diagnose = crash_estimator.cli.diagnose:main",
             "diagnosis = crash_estimator.nodes.diagnosis_command:main",

@@ -113,5 +113,5 @@ def _each_output(model: Model, values: Sequence[np.ndarray]) -> list[float]:
 def _units(model: Model) -> list[tuple[str, float]]:
     """Of each output, by the size of what was measured: the unit shown, and the factor to it."""
     measured = np.concatenate([record.measured for record in model.records])
-    units = ["N" if output.fixed else "m/s^2" for output in model.fit.layout.outputs]
+    units = [output.unit for output in model.fit.layout.outputs]
     return [readable(unit, measured[:, k]) for k, unit in enumerate(units)]

@@ -81,6 +81,9 @@ class BodyPart(Part):
     motion: Text | tuple[Text, ...] | None = None
     fixed: StrictBool = False
     force: Text | None = None
+    applied: Text | None = None
+    displacement: Text | None = None
+    velocity: Text | None = None
     noise: Positive | None = None  # m/s^2, or N for a measured force
 
     @model_validator(mode="after")
@@ -89,8 +92,14 @@ class BodyPart(Part):
             raise ValueError("a driven body (`motion`) takes no mass, acceleration or fixed")
         if self.fixed and (self.acceleration or self.mass):
             raise ValueError("a fixed body takes no mass and no acceleration")
+        of_free = [key for key in ("applied", "displacement", "velocity") if getattr(self, key)]
+        if of_free and (self.fixed or self.motion is not None):
+            raise ValueError(f"`{of_free[0]}` belongs to a free body, one with a mass")
         if self.force and not self.fixed:
-            raise ValueError("`force` is the measured force on a fixed body: add `fixed: true`")
+            raise ValueError(
+                "`force` is the measured force on a fixed body: add `fixed: true`, or call it `applied` where it "
+                "pushes a free body"
+            )
         return self
 
     def body(self, name: str) -> Body:
@@ -103,6 +112,9 @@ class BodyPart(Part):
             fixed=self.fixed,
             force=self.force,
             noise=self.noise,
+            applied=self.applied,
+            displacement=self.displacement,
+            velocity=self.velocity,
         )
 
 

@@ -8,11 +8,15 @@ import numpy as np
 from crash_replay.shown_units import readable
 
 from .core.estimate import Description, ElementState, Estimate, ParameterStatus
+from .core.sensor_noise import sensor_noise
 from .core.structure import Structure
 from .core.validation import LEVELS, Validation
 from .figures import Line, Panel
 from .page_blocks import Block, Figure, Heading
 from .tables import unit_of
+
+BAND = 2.576
+"""Standard deviations on each side that hold 99 % of a normal distribution."""
 
 
 class Result(NamedTuple):
@@ -37,7 +41,9 @@ def result_figures(structure: Structure, results: dict[str, Result]) -> list[Blo
         lines = [
             Line(time_of(r.estimates), column_of(r.estimates, "residual", k) * factor, m) for m, r in results.items()
         ]
-        errors.append(Panel(f"{name}: error", "time in ms", shown, lines))
+        band = BAND * _noise(first, k) * factor
+        levels = [(band, "99 % of the noise"), (-band, "")]
+        errors.append(Panel(f"{name}: error", "time in ms", shown, lines, levels))
         correlations += _correlations(k, results)
     page = [
         Heading("Estimated outputs (figures 5.5, 5.12, 5.18)"),
@@ -96,6 +102,14 @@ def _characteristics(structure: Structure, results: dict[str, Result]) -> list[P
             panels.append(Panel(title, "crush in mm", stiffness_unit, stiffness, y_range=limits))
         panels.append(Panel(f"{element.name}: force", "crush in mm", force_unit, force))
     return panels
+
+
+def _noise(result: Result, k: int) -> float:
+    """Standard deviation of the sensors' own noise in an equation's measurement."""
+    measured = column_of(result.estimates, "measured", k)
+    valid = np.isfinite(measured)
+    time_ns = np.array([e.time_ns for e in result.estimates])
+    return sensor_noise(measured[valid], time_ns[valid], rests=True).std
 
 
 def equations_of(results: dict[str, Result]) -> list[tuple[str, str]]:

@@ -13,7 +13,8 @@ from crash_replay.recording import Recording, RecordingError
 from crash_replay.shown_units import readable
 
 from .core.characteristic import characteristics
-from .core.diagnosis import Diagnosis, diagnose
+from .core.derived_motion import with_accelerations
+from .core.diagnosis import UNEXPLAINED, Diagnosis, diagnose
 from .core.effects import EFFECTS
 from .core.effects.applied import applied
 from .core.effects.effect import Effect
@@ -32,6 +33,9 @@ from .page_markdown import write_markdown_page
 from .report_figures import Result, column_of, equations_of, result_figures, time_of
 from .tables import error_table, parameter_table, unit_of
 from .validation_tables import comparison_table, correlation_table, covariance_table
+
+REVISED = "revision 1"
+"""What the model with what was found is called, beside the model as it was given."""
 
 
 def write_report(  # noqa: PLR0913 - every option of the command
@@ -53,25 +57,33 @@ def write_report(  # noqa: PLR0913 - every option of the command
     The settings go to the methods that have them; seconds: after which the diagnosis tries nothing more; `told` hears
     of each part when it is done, and how long it took.
     """
+    structure, (recording,) = with_accelerations(structure, [recording])
     if not ((recording.time > 0.0) & (recording.time <= end)).any():
         raise ModelError(f"test {recording.test.id} has no samples between the impact and {end:g} s")
     step = partial(_timed, told)
     with step("diagnosis"):
-        sentence, missing = _missing(recording, structure, end, effects, seconds)
-    estimated = partial(_estimated, recording, structure, end=end, effects=effects)
-    structure = applied(structure, recording.test, effects)
+        sentence, missing, better = _missing(recording, structure, end, effects, seconds)
+    estimated = partial(_estimated, recording, end=end, effects=effects)
     results = {}
     for method in methods:
         with step(f"estimates by {method}"):
-            results[method] = estimated(method, settings=settings)
-    best = methods[-1]
+            results[method] = estimated(structure, method, settings=settings)
+    best, given = methods[-1], applied(structure, recording.test, effects)
+    runs = {best: (given, results[best])}
+    if better:
+        with step(f"estimates by {best} with what was found"):
+            result = estimated(better, best, settings=settings)
+        runs[f"{best} {REVISED}"] = applied(better, recording.test, effects), result
+        if result.description.equations == results[best].description.equations:
+            results[f"{best} {REVISED}"] = result
+        missing += [Paragraph(_what_is_revised(structure, better))]
     with step("free run"):
-        runs_free = _free_run(structure, results[best], best, end, smooth, compared)
+        runs_free = _free_runs(recording, runs, end, smooth, compared)
     with step("jumps"):
-        jumps = _jumps(estimated("afmm", settings={}))
-    masses = _masses(recording, structure, end)
-    blocks = [Paragraph(sentence), *missing, *_test(recording, structure, end), *_tables(results)]
-    blocks += [*result_figures(structure, results), *runs_free, *jumps, *masses]
+        jumps = _jumps(estimated(structure, "afmm", settings={}))
+    masses = _masses(recording, given, end)
+    blocks = [Paragraph(sentence), *missing, *_test(recording, given, end), *_tables(results)]
+    blocks += [*result_figures(given, results), *runs_free, *jumps, *masses]
     page = Page(recording.test.title or recording.test.id, blocks)
     with step("page"), written_into(folder) as place:
         (place / "report.html").write_text(html_page(page), encoding="utf-8")
@@ -115,22 +127,31 @@ def _test(recording: Recording, structure: Structure, end: float) -> list[Block]
 
 def _missing(
     recording: Recording, structure: Structure, end: float, effects: Mapping[str, Effect], seconds: float
-) -> tuple[str, list[Block]]:
-    """The page's first sentence and what `diagnose` says; or why it says nothing: the rest is said all the same."""
+) -> tuple[str, list[Block], Structure | None]:
+    """The page's first sentence, what `diagnose` says, the model with what it has found; None where that is nothing.
+
+    Or why it says nothing: the rest is said all the same.
+    """
     until = recording.time <= end
     judged = Recording(recording.test, recording.time_ns[until], recording.values[until])
     try:
         found = diagnose(structure, [judged], effects, seconds=seconds)
     except (ModelError, RecordingError) as error:
         why = f"What the model lacks was not searched for: {error}."
-        return f"Model {structure.name} on test {recording.test.id}: parameters, errors and free run. {why}", []
-    return first_sentence(found, structure.name, recording.test.id), _what_is_missing(found)
+        return f"Model {structure.name} on test {recording.test.id}: parameters, errors and free run. {why}", [], None
+    better = found.structure if found.steps and found.verdict != UNEXPLAINED else None
+    return first_sentence(found, structure.name, recording.test.id), _what_is_missing(found), better
 
 
 def _what_is_missing(found: Diagnosis) -> list[Block]:
     said = " ".join(f"{text[0].upper()}{text[1:]}." for text in (found.text, doubt(found)) if text)
     said += " Errors here are of the best fit with one curve for each element over the whole record."
     return [Heading("What is missing"), Paragraph(said), Lines(diagnosis_tables(found))]
+
+
+def _what_is_revised(given: Structure, better: Structure) -> str:
+    added = [f"{spec.type} on {spec.target}" for spec in better.effects if spec not in given.effects]
+    return f"In all that follows, {REVISED} is the model with {' and '.join(added)}, in front of the model as given."
 
 
 def _tables(results: dict[str, Result]) -> list[Block]:
@@ -172,38 +193,55 @@ def _cross(results: dict[str, Result]) -> Table:
     return Table(("error of", "with"), rows)
 
 
-def _free_run(
-    structure: Structure, result: Result, method: str, end: float, smooth: Callable, compared: str
+def _free_runs(
+    recording: Recording, runs: Mapping[str, tuple[Structure, Result]], end: float, smooth: Callable, compared: str
 ) -> list[Block]:
-    """The best method's characteristics, simulated from the impact on (figures 4.16 to 4.19, 6.13, 6.14)."""
-    description, estimates = result.description, result.estimates
-    simulated = free_run(structure, description, estimates, end=end)
-    panels = []
-    for k, (name, unit) in enumerate(zip(description.equations, description.equation_units, strict=True)):
-        shown, factor = readable(unit, simulated.measured[:, k])
-        lines = [
-            Line(simulated.time * 1e3, smooth(simulated.measured[:, k]) * factor, "measured", "#555555"),
-            Line(simulated.time * 1e3, smooth(simulated.predicted[:, k]) * factor, "free run", "#d62728"),
-        ]
-        panels.append(Panel(f"{name}, {compared}", "time in ms", shown, lines))
+    """The best method's characteristics, simulated from the impact on (figures 4.16 to 4.19, 6.13, 6.14).
+
+    runs: by method and revision, the newest last; the panels are those of the first.
+    """
+    simulated = {
+        name: free_run(s, r.description, r.estimates, end=end, recording=recording) for name, (s, r) in runs.items()
+    }
+    structure, result = next(iter(runs.values()))
+    first, panels = next(iter(simulated.values())), []
+    colours = dict(zip(simulated, ("#d62728",) if len(runs) == 1 else ("#e7a3a3", "#2ca02c")))
+
+    def panel(title: str, shown: str, measured: np.ndarray, column: Callable[[str], np.ndarray]) -> Panel:
+        lines = [Line(first.time * 1e3, measured, "measured", "#555555")]
+        lines += [Line(run.time * 1e3, column(name), name, colours[name]) for name, run in simulated.items()]
+        return Panel(title, "time in ms", shown, lines)
+
+    for k, (equation, unit) in enumerate(zip(result.description.equations, result.description.equation_units)):
+        shown, factor = readable(unit, first.measured[:, k])
+        at = {name: r.description.equations.index(equation) for name, (_, r) in runs.items()}
+        panels.append(
+            panel(
+                f"{equation}, {compared}",
+                shown,
+                smooth(first.measured[:, k]) * factor,
+                lambda name, at=at, factor=factor: smooth(simulated[name].predicted[:, at[name]]) * factor,
+            )
+        )
     for k, body in enumerate(structure.bodies):
         if body.free and body.acceleration:
-            lines = [
-                Line(simulated.time * 1e3, simulated.measured_velocity[:, k], "measured", "#555555"),
-                Line(simulated.time * 1e3, simulated.velocity[:, k], "free run", "#d62728"),
-            ]
-            panels.append(Panel(f"{body.name}: velocity", "time in ms", "m/s", lines))
-    laws = characteristics(structure, description, estimates)
+            at = {name: s.body_index[body.name] for name, (s, _) in runs.items()}
+            column = lambda name, at=at: simulated[name].velocity[:, at[name]]  # noqa: E731
+            panels.append(panel(f"{body.name}: velocity", "m/s", first.measured_velocity[:, k], column))
+    blocks: list[Block] = [Heading("Free run (figures 4.16 to 4.19, 6.13, 6.14)")]
+    for name, (s, r) in runs.items():
+        said = f"The model with the characteristics from {name}, by Runge-Kutta from the initial velocities."
+        blocks += [
+            Paragraph(f"{said} {_slopes(s, r)}"),
+            Lines(comparison_table(compare(s, r.description, simulated[name], smooth))),
+        ]
+    return [*blocks, Figure("free_run", panels)]
+
+
+def _slopes(structure: Structure, result: Result) -> str:
+    laws = characteristics(structure, result.description, result.estimates)
     slopes = ", ".join(f"{law.element} {law.unloading * 1e-3:.4g} kN/m" for law in laws if law.unloading is not None)
-    said = f"Unloading slopes: {slopes}." if slopes else "All elements unload as they load."
-    return [
-        Heading("Free run (figures 4.16 to 4.19, 6.13, 6.14)"),
-        Paragraph(
-            f"The model with the characteristics from {method}, by Runge-Kutta from the initial velocities. {said}"
-        ),
-        Lines(comparison_table(compare(structure, description, simulated, smooth))),
-        Figure("free_run", panels),
-    ]
+    return f"Unloading slopes: {slopes}." if slopes else "All elements unload as they load."
 
 
 def _jumps(result: Result) -> list[Block]:

@@ -14,6 +14,8 @@ LEFT, RIGHT, TOP, BOTTOM = 56, 10, 26, 38  # px around the axes
 MOST_POINTS = 400
 """Bins of a line: in each its lowest and highest value are drawn, so that no peak is lost."""
 TICKS = 5
+ROW, LETTER = 13, 5
+"""px of a legend: a row's height, and the width of a letter at most."""
 
 
 def svg_panel(panel: Panel, height: int) -> str:
@@ -25,13 +27,14 @@ def svg_panel(panel: Panel, height: int) -> str:
         up = bottom - (np.asarray(y) - y_range[0]) / (y_range[1] - y_range[0]) * (bottom - TOP)
         return across, np.clip(up, -1e4, 1e4)
 
-    parts = [f'<svg viewBox="0 0 {WIDTH} {height}" role="img" aria-label="{_shown(panel.title)}">']
+    colours = _colours(panel.lines)
+    legend, rows = _legend(panel.lines, colours, height)
+    parts = [f'<svg viewBox="0 0 {WIDTH} {height + ROW * rows}" role="img" aria-label="{_shown(panel.title)}">']
     parts += _axes(panel, x_range, y_range, at, right, bottom)
     inside = f'<rect x="{LEFT}" y="{TOP}" width="{right - LEFT}" height="{bottom - TOP}"/>'
     parts.append(f'<clipPath id="inside{height}">{inside}</clipPath>')
     parts.append(f'<g clip-path="url(#inside{height})">')
-    colours = _colours(panel.lines)
-    for line, colour in zip(panel.lines, colours, strict=False):
+    for line, colour in zip(panel.lines, colours):
         if line.spread is not None:
             parts.append(_band(line, colour, at))
     parts += [_line(line, colour, at) for line, colour in zip(panel.lines, colours, strict=False)]
@@ -50,7 +53,7 @@ def svg_panel(panel: Panel, height: int) -> str:
         if label:
             x, _ = at(value, 0.0)
             parts.append(_text(x + 2, TOP + 9, label, "start", "small"))
-    return "".join([*parts, *_legend(panel.lines, colours, right), "</svg>"])
+    return "".join([*parts, *legend, "</svg>"])
 
 
 def _colours(lines: Sequence[Line]) -> list[str]:
@@ -81,7 +84,7 @@ def round_ticks(low: float, high: float) -> np.ndarray:
     rough = (high - low) / TICKS
     power = 10.0 ** np.floor(np.log10(rough))
     step = next(power * factor for factor in (1.0, 2.0, 5.0, 10.0) if power * factor >= rough * 0.999)
-    return np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1) * step
+    return np.arange(np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9) + 1) * step + 0.0
 
 
 def _axes(panel: Panel, x_range, y_range, at, right: int, bottom: int) -> list[str]:
@@ -110,15 +113,19 @@ def _shown(text: str) -> str:
     return escape(visible(text))
 
 
-def _legend(lines: Sequence[Line], colours: Sequence[str], right: int) -> list[str]:
-    parts, row = [], 0
-    for line, colour in zip(lines, colours, strict=False):
+def _legend(lines: Sequence[Line], colours: Sequence[str], top: int) -> tuple[list[str], int]:
+    """Below the plot, where no curve is, in as many rows as it takes."""
+    parts, x, row = [], LEFT, 0
+    for line, colour in zip(lines, colours):
         if line.label:
-            y = TOP + 10 + 12 * row
-            parts.append(f'<path d="M{right - 14} {y - 3}h12" stroke="{escape(colour)}" stroke-width="2"/>')
-            parts.append(_text(right - 18, y, line.label, "end", "small"))
-            row += 1
-    return parts
+            width = 24 + LETTER * len(line.label)
+            if x > LEFT and x + width > WIDTH:
+                x, row = LEFT, row + 1
+            y = top + ROW * row + 8
+            parts.append(f'<path d="M{x} {y - 3}h12" stroke="{escape(colour)}" stroke-width="2"/>')
+            parts.append(_text(x + 16, y, line.label, "start", "small"))
+            x += width
+    return parts, row + 1 if parts else 0
 
 
 def thinned(line: Line) -> tuple[np.ndarray, np.ndarray]:

@@ -78,7 +78,8 @@ class Audience:
 
     def leave(self) -> None:
         """Nothing more can be had of this replay."""
-        self.attending.leave()
+        if not self.attending.own.leaving:
+            self.attending.leave()
 
     def _listeners(self) -> list[str]:
         replays = self.words.names(REPLAY)

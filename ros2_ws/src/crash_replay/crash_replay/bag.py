@@ -14,6 +14,7 @@ import numpy as np
 
 from . import limits
 from .bag_contents import Topic, bag_files, read_topics
+from .bag_namespace import TEST_TOPIC, TEST_TYPE, is_read, own_topics, parted
 from .bag_writer import LATCHED, STREAM, TopicToWrite, write_mcap, write_metadata
 from .channel_messages import CARRIERS, SECOND, decode, encode
 from .message_types import decode_test, encode_test
@@ -21,7 +22,6 @@ from .output import written
 from .recording import Channel, Recording, RecordingError, Test
 from .samples_in_bag import SAMPLES_TOPIC, read_samples
 
-TEST_TOPIC, TEST_TYPE = "/test", "crash_msgs/msg/TestInfo"
 CHANNEL_TOPICS = "/channels/"
 NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*_?")
 """What ROS takes as a part of a topic's name."""
@@ -102,13 +102,15 @@ def read_bag(path: str | Path, recover: bool = False) -> Recording:
 
     Where the bag has `/samples`, as `record` writes them, each number of any pass is one sample. Else channels are
     aligned by their messages' header stamps; where one lacks a stamp of the others its value is NaN. Notes say what is
-    missing. With `recover`, a bag that was cut off gives what is intact.
+    missing. With `recover`, a bag that was cut off gives what is intact. Where it was recorded in a namespace see
+    `bag_namespace`.
 
     Raises RecordingError with one line that names the file, the topic and what to do.
     """
-    path = Path(path)
-    wanted = (TEST_TOPIC, SAMPLES_TOPIC, CHANNEL_TOPICS)
-    topics, broken = read_topics(bag_files(path), lambda topic: topic.startswith(wanted))
+    path, wanted = parted(path)
+    topics, broken = read_topics(bag_files(path), is_read)
+    namespace, topics = own_topics(path, topics, wanted)
+    path = Path(f"{path}#{namespace.strip('/')}") if namespace else path  # as errors name it
     if broken and not (recover and TEST_TOPIC in topics):
         way_out = (
             f"`import {path} --recover --to NEW` copies what is intact" if TEST_TOPIC in topics else "nothing is intact"

@@ -70,8 +70,8 @@ class Written:
 class Completeness:
     """Keeps account of a recording."""
 
-    def __init__(self, choice: Choice, others: Attendance):
-        self.choice, self.others = choice, others
+    def __init__(self, choice: Choice, others: Attendance, samples_topic: str = "/samples"):
+        self.choice, self.others, self.samples_topic = choice, others, samples_topic
         self.written: dict[str, Written] = {}  # by topic, of the types NUMBERED
         self.types: dict[str, str] = {}  # of the topics that were found
         self.finals: dict[str, int] = {}  # by diagnosis, run of its last final ranking
@@ -108,8 +108,8 @@ class Completeness:
         return Pass(run, 0, 0, self.total, finished=False)
 
     def samples(self) -> list[str]:
-        """The topic, or topics, with samples."""
-        return [topic for topic, kind in self.types.items() if kind == SAMPLES]
+        """The topic with the samples, where it was found."""
+        return [self.samples_topic] if self.types.get(self.samples_topic) == SAMPLES else []
 
     def estimates(self, node: str) -> list[str]:
         """An estimator's topics that must be complete."""
@@ -135,7 +135,7 @@ class Completeness:
         if not of.total:
             return ["no test was heard, so nobody knows what is missing"]
         missing = [self._missing_of(topic, of, "") for topic in self.samples()]
-        if not self.samples() and self.replayed and self.choice.wants("/samples", SAMPLES):
+        if not self.samples() and self.replayed and self.choice.wants(self.samples_topic, SAMPLES):
             missing.append("samples: the topic was not found")
         for node in self.others.names(ESTIMATOR):
             missing += [self._missing_of(topic, of, self._why(node)) for topic in self.estimates(node)]

@@ -7,6 +7,7 @@ from importlib import import_module
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
+from .namespaces import is_own
 from .qos import EVERY_SAMPLE, EVERY_SAMPLE_SAID
 from .recorded_topics import PARAMETERS, SAMPLES, Choice
 from .recorder import Heard
@@ -28,23 +29,25 @@ class Listening:
         for name, (kind, *_) in self.node.get_topic_names_and_types():
             if name in self.heard or not self.choice.wants(name, kind) or not self.node.count_publishers(name):
                 continue
-            if kind != SAMPLES or self.settled():
-                found.append(self._subscribe(name, kind))
+            own = is_own(self.node, name)
+            if self.choice.wants(name, kind, own) and (kind != SAMPLES or self.settled()):
+                found.append(self._subscribe(name, kind, own))
         return found
 
     def settled(self) -> bool:
-        estimators = sum(topic.type == PARAMETERS for topic in self.heard.values())
+        estimators = sum(topic.type == PARAMETERS and topic.own for topic in self.heard.values())
         return estimators >= self.wait_for and time.monotonic() - self.newest > SETTLED
 
     def ready(self) -> bool:
         """Whether all that is to be recorded reaches this node from now on."""
-        if self.choice.wants("/samples", SAMPLES):
-            return any(topic.type == SAMPLES for topic in self.heard.values())
+        samples = self.node.resolve_topic_name("samples")
+        if self.choice.wants(samples, SAMPLES):
+            return samples in self.heard
         return self.settled()
 
-    def _subscribe(self, name: str, kind: str) -> Heard:
+    def _subscribe(self, name: str, kind: str, own: bool) -> Heard:
         qos = self._qos(name)
-        topic = self.heard[name] = Heard(name, kind, latched=qos is EVERY_SAMPLE_SAID)
+        topic = self.heard[name] = Heard(name, kind, qos is EVERY_SAMPLE_SAID, own)
         self.newest = time.monotonic()
         package, _, message = kind.split("/")
         message_type = getattr(import_module(f"{package}.msg"), message)

@@ -1,12 +1,13 @@
 """Parameters of a node from a table: what each is by default, means and may be; what is wrong is one line.
 
-PARAMETERS = {"every": Allowed(0.002, "s of the crash between two rankings", 1e-5, 1e4)}
+PARAMETERS = {"every": Allowed(0.002, "s of the crash between two rankings", 1e-5, 1e4, live=True)}
 super().__init__("diagnosis", automatically_declare_parameters_from_overrides=True)
 given = declare_parameters(self, PARAMETERS)      # {"every": 0.002}
+follow_changes(self, PARAMETERS, self.change)     # self.change({"every": 0.001}) when somebody sets it
 """
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Mapping
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,8 +15,9 @@ from .fault import Fault
 from .limits import TEXT, shown
 
 if TYPE_CHECKING:  # a table can be read without ROS
-    from rcl_interfaces.msg import ParameterDescriptor
+    from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
     from rclpy.node import Node
+    from rclpy.parameter import Parameter
 
 KIND = {str: "a text", bool: "true or false", int: "a whole number", float: "a number", list: "a list of names"}
 OF_EVERY_NODE = ("use_sim_time", "start_type_description_service", "qos_overrides")
@@ -37,19 +39,25 @@ class Allowed(NamedTuple):
     choices: tuple[str, ...] = ()
     pattern: str = ""  # regular expression of a text, or of each of a list; the empty text is always one
     needed: str = ""  # what to do where it is empty, which it may not be
+    live: bool = False  # whether it may be set while the node runs; any other is read-only
 
 
-def declare_parameters(node: "Node", table: Mapping[str, Allowed], live: Collection[str] = ()) -> dict[str, Any]:
-    """Declare all of them and give their values; only those in `live` can be set later.
+def given_to(node: "Node") -> dict[str, Any]:
+    """What a node was started with.
 
-    The node must have declared its overrides by itself, untyped: so what is wrong with one is said in our words.
+    It must have declared its overrides by itself, untyped: so what is wrong with one is said in our words.
     """
-    given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
+    return {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
+
+
+def declare_parameters(node: "Node", table: Mapping[str, Allowed]) -> dict[str, Any]:
+    """Declare all of them and give their values. Raises ParameterError, also where one is given that there is not."""
+    given = given_to(node)
     for name in given:
         if name not in table and name.split(".")[0] not in OF_EVERY_NODE:
             near = get_close_matches(name, table, n=1)
             hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(table)}"
-            node.get_logger().warning(f"there is no parameter {name}: {hint}")
+            raise ParameterError(f"there is no parameter {name}: {hint}")
     values = {name: checked(table, name, given.get(name, allowed.default)) for name, allowed in table.items()}
     for name, allowed in table.items():
         if allowed.needed and not values[name]:
@@ -57,8 +65,24 @@ def declare_parameters(node: "Node", table: Mapping[str, Allowed], live: Collect
     for name, value in values.items():
         if name in given:
             node.undeclare_parameter(name)
-        node.declare_parameter(name, value, _descriptor(table[name], name in live), ignore_override=True)
+        node.declare_parameter(name, value, _descriptor(table[name]), ignore_override=True)
     return values
+
+
+def follow_changes(node: "Node", table: Mapping[str, Allowed], change: Callable[[dict[str, Any]], None]) -> None:
+    """change: is given those that somebody sets while the node runs, all or none; a Fault from it refuses them."""
+    from rcl_interfaces.msg import SetParametersResult
+
+    def follow(parameters: "list[Parameter]") -> "SetParametersResult":
+        try:
+            new = {p.name: checked(table, p.name, p.value) for p in parameters if p.name in table}
+            if new:
+                change(new)
+        except Fault as fault:
+            return SetParametersResult(successful=False, reason=" ".join(str(fault).split()))
+        return SetParametersResult(successful=True)
+
+    node.add_on_set_parameters_callback(follow)
 
 
 def checked(table: Mapping[str, Allowed], name: str, value: Any) -> Any:
@@ -69,8 +93,10 @@ def checked(table: Mapping[str, Allowed], name: str, value: Any) -> Any:
         value = str(value).lower()
     if kind is list and isinstance(value, str):
         value = [value]
+    if allowed.pattern and isinstance(value, int | float) and not isinstance(value, bool):
+        value = f"{value:g}"  # a text that looks like a number is one in YAML
     if not (_fits(kind, value) and _within(allowed, value)):
-        raise ParameterError(f"parameter {name} must be {_expected(allowed)}, got {shown(value)} ({allowed.meaning})")
+        raise ParameterError(f"parameter {name} must be {expected(allowed)}, got {shown(value)} ({allowed.meaning})")
     return kind(value) if kind is not list else list(value) or allowed.default  # ROS knows no type of an empty list
 
 
@@ -92,7 +118,8 @@ def _within(allowed: Allowed, value: Any) -> bool:
     return allowed.lowest is None or allowed.lowest <= value <= allowed.highest
 
 
-def _expected(allowed: Allowed) -> str:
+def expected(allowed: Allowed) -> str:
+    """What a parameter may be, in words."""
     if allowed.choices:
         return ", ".join(allowed.choices)
     kind = KIND[type(allowed.default)]
@@ -106,12 +133,16 @@ def names_in(value: list[str]) -> list[str]:
     return [name for name in value if name]
 
 
-def _descriptor(allowed: Allowed, live: bool) -> "ParameterDescriptor":
+def _descriptor(allowed: Allowed) -> "ParameterDescriptor":
     from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
-    descriptor = ParameterDescriptor(description=allowed.meaning, read_only=not live)
+    one_of = f"one of {', '.join(allowed.choices)}" if allowed.choices else ""
+    descriptor = ParameterDescriptor(
+        description=allowed.meaning, read_only=not allowed.live, additional_constraints=one_of or allowed.pattern
+    )
+    # an integer is a number too, and a text may look like one
+    descriptor.dynamic_typing = isinstance(allowed.default, float) or bool(allowed.pattern)
     if isinstance(allowed.default, float):
-        descriptor.dynamic_typing = True  # an integer is a number too
         if allowed.lowest is not None:
             descriptor.floating_point_range = [FloatingPointRange(from_value=allowed.lowest, to_value=allowed.highest)]
     elif allowed.lowest is not None:

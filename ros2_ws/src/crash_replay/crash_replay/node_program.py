@@ -22,13 +22,14 @@ def node_program(name: str, about: str, parameters: Mapping[str, Allowed], modul
 
 
 def help_text(name: str, about: str, parameters: Mapping[str, Allowed]) -> str:
-    width = max(map(len, parameters)) + 4
+    width = max(map(len, parameters), default=0) + 4
     rows = (
         fill(f"{parameter:{width - 2}}{_meaning(allowed)}", WIDTH, initial_indent="  ", subsequent_indent=" " * width)
         for parameter, allowed in parameters.items()
     )
     usage = f"usage: {name} [--ros-args [-p PARAMETER:=VALUE] ... [-r __node:=NAME]]"
-    return "\n".join((usage, "", about.strip(), "", "parameters:", *rows))
+    head = ("", "parameters:") if parameters else ()  # none: of its nodes, which say theirs
+    return "\n".join((usage, "", about.strip(), *head, *rows))
 
 
 def _meaning(allowed: Allowed) -> str:

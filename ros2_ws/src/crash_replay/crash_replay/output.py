@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from .bag_namespace import parted
 from .fault import Fault
 from .foreign_text import visible
 
@@ -95,7 +96,7 @@ def check_outputs(
     folders: outputs that may be one. What lies in an input's folder, and the description beside a CSV, are inputs too.
     None: not given. Raises OutputError with option and file.
     """
-    read = [Path(path) for path in inputs if path is not None]
+    read = [parted(path)[0] for path in inputs if path is not None]
     outputs = {option: Path(path) for option, path in {**folders, **files}.items() if path is not None}
     for option, path in outputs.items():
         if option not in folders and path.is_dir():

@@ -34,6 +34,7 @@ class Outcome(NamedTuple):
 
     text: str  # one line
     lacking: list[str]  # a line on each who lacks samples
+    stopped: bool = False  # before the last sample was sent, or while it was kept alive
 
 
 class SubscribersMissing(Fault):
@@ -167,7 +168,7 @@ class Pacing:
             f"asked for, at worst {tally.worst_lateness * 1e3:.2f} ms late"
             + ("" if arrived or lacking else "; a subscriber has not taken all of them")
         )
-        return Outcome(text, lacking)
+        return Outcome(text, lacking, stopped)
 
     def _wait_for_listeners(self, timeout: float) -> None:
         """Who has been stopped, or came late, asks for what he lacks: the samples can be had while this waits."""

@@ -1,11 +1,17 @@
 """Which machine this is, and whether a process of it still runs: from /proc, where the system has it."""
 
+import ctypes
 import os
 import platform
-from functools import cache
+import signal
+import sys
+from collections.abc import Callable
+from functools import cache, partial
 from pathlib import Path
 
 PROCESSES = Path("/proc")
+LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None  # loaded before any fork
+SET_PARENT_DEATH_SIGNAL = 1
 
 
 @cache
@@ -34,3 +40,15 @@ def has_ended(process: int) -> bool:
 def is_stopped(process: int) -> bool:
     """Whether something has stopped it: a debugger, Ctrl-Z, SIGSTOP."""
     return state_of(process) in ("T", "t")
+
+
+def ends_with_this() -> Callable[[], None] | None:
+    """For `preexec_fn` of a process to start: on Linux it ends when this one is gone, even where that was killed."""
+    return partial(end_with, os.getpid()) if LIBC else None
+
+
+def end_with(parent: int) -> None:
+    """Ask Linux to end this process when that one, its parent, is gone."""
+    LIBC.prctl(SET_PARENT_DEATH_SIGNAL, signal.SIGTERM)
+    if os.getppid() != parent:  # it was gone already
+        os._exit(1)

@@ -40,6 +40,14 @@ SAID = QoSProfile(
 )
 """A diagnosis: few messages, which a late joiner gets as well."""
 
+EVENTS = QoSProfile(
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1000,
+)
+"""What an estimator has met, for late joiners as well: of the bundled tests and methods none has more than 400."""
+
 UNLATCHED = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.VOLATILE,

@@ -9,15 +9,8 @@ recording is complete: on the terminal, in the file and by its exit status. What
 
 import sys
 
-from .node_parameters import Allowed
 from .node_program import node_program
-
-PARAMETERS = {
-    "to": Allowed("", "the file to write, which must not exist: *.mcap", needed="-p to:=estimates.mcap"),
-    "wait_for": Allowed(1, "estimators to hear before the samples", 0, 1000),
-    "topics": Allowed([""], "names or patterns such as /kalman/*; without any: all but channels and clock"),
-    "exclude": Allowed([""], "topics to leave out, names or patterns"),
-}
+from .record_parameters import PARAMETERS
 
 
 def main() -> int:

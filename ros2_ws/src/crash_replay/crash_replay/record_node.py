@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from crash_msgs.msg import EstimatorState, Ranking, ReplayState, TestInfo
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
@@ -19,13 +20,15 @@ from .fault import Fault, NobodyReads
 from .fetching import Fetching
 from .health import Health, HealthReport, Level
 from .listening import Listening
+from .namespaces import namespace_of
 from .node_parameters import declare_parameters, names_in
 from .numbers import Numbers
-from .record_command import PARAMETERS
-from .recorded_topics import NUMBERED, Choice, about, unreadable
+from .record_parameters import PARAMETERS
+from .recorded_topics import DIAGNOSTICS, NUMBERED, Choice, about, unreadable
 from .recorder import Heard, Recorder
 from .ros_runtime import run
 from .said import say
+from .selection import regular_expression
 
 LOOK = 0.1
 """s between two looks for new topics, and for the end."""
@@ -35,7 +38,7 @@ REPLAY_SILENT = 60.0
 """s of silence after which a replay counts as gone."""
 STOOD_STILL = 2.0
 """s between two looks that are worth saying."""
-GOES_ON = {"crash_msgs/msg/Attendance", "crash_msgs/msg/ReplayState", "diagnostic_msgs/msg/DiagnosticArray"}
+GOES_ON = {"crash_msgs/msg/Attendance", "crash_msgs/msg/ReplayState", DIAGNOSTICS}
 """What is said as long as a node is there."""
 
 
@@ -49,10 +52,13 @@ class RecordNode(Node):
     def __init__(self) -> None:
         super().__init__("record", automatically_declare_parameters_from_overrides=True)
         asked = declare_parameters(self, PARAMETERS)
-        choice = Choice(names_in(asked["topics"]), names_in(asked["exclude"]))
+        for name in ("regex", "exclude_regex"):
+            regular_expression(asked[name], name)
+        lists = names_in(asked["topics"]), names_in(asked["exclude"])
+        choice = Choice(*lists, self.get_namespace(), asked["regex"], asked["exclude_regex"])
         self.recorder = opened(asked["to"])
         self.attending = Attending(self, "record", self._progress)
-        self.account = Completeness(choice, self.attending.others)
+        self.account = Completeness(choice, self.attending.others, self.resolve_topic_name("samples"))
         self.listening = Listening(self, choice, asked["wait_for"], self._hear)
         self.fetching = Fetching(self, self.account, self._hear)
         self.replayed = self.all_said = False  # a replay is or was there; nothing more is to be expected
@@ -70,6 +76,8 @@ class RecordNode(Node):
             return
         if why := unreadable(topic.type, data):
             return self.get_logger().error(f"{topic.name}: {why}: left out", throttle_duration_sec=10.0)
+        if topic.type == DIAGNOSTICS and not said_within(data, self.get_namespace()):
+            return
         try:
             new = self.recorder.hear(topic, data)
         except OSError as error:
@@ -77,7 +85,7 @@ class RecordNode(Node):
         if topic.type not in GOES_ON:
             self.last = time.monotonic()
         try:
-            if new:
+            if new and topic.own:
                 self._take_account(topic, data)
         except Exception as error:  # whatever a message that is none of its type makes the middleware say
             self.get_logger().error(f"{topic.name}: does not decode as {topic.type} ({error}): written as it came")
@@ -165,7 +173,10 @@ class RecordNode(Node):
         if kinds <= {"crash_msgs/msg/Attendance"}:  # it hears its own words
             self.recorder.give_up("nothing came")
             file.unlink()
-            return "error: nothing came to be recorded: do replay and estimators run, with this ROS_DOMAIN_ID?"
+            return (
+                "error: nothing came to be recorded: do replay and estimators run, with this ROS_DOMAIN_ID and "
+                f"in this namespace ({self.get_namespace()})?"
+            )
         self._see_replay()
         missing = "; ".join(self._missing())
         try:
@@ -195,6 +206,15 @@ class RecordNode(Node):
         if not self.finished:
             missing.append("record was told to end")
         return missing + [f"record stood still from {when}" for when in self.stood_still]
+
+
+def said_within(data: bytes, namespace: str) -> bool:
+    """Whether a DiagnosticArray is about a node of this namespace: all share one topic for it."""
+    try:
+        about = [status.name.split(":")[0] for status in deserialize_message(data, DiagnosticArray).status]
+    except Exception:  # whatever a message that is none of its type makes the middleware say
+        return False
+    return any(namespace_of(name) == namespace for name in about)
 
 
 def opened(name: str) -> Recorder:

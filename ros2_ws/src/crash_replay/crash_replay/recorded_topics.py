@@ -1,5 +1,6 @@
 """Which topics `record` writes, and what it can tell of their messages without making objects of them."""
 
+import re
 import struct
 from collections.abc import Iterable, Sequence
 from fnmatch import fnmatchcase
@@ -10,6 +11,7 @@ from .channel_messages import CARRIERS, SECOND
 SAMPLES, PARAMETERS, RESIDUALS, FORCES = (
     f"crash_msgs/msg/{name}" for name in ("Samples", "ParametersBlock", "ResidualsBlock", "Forces")
 )
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 TEST, RANKING, REVISION = (f"crash_msgs/msg/{name}" for name in ("TestInfo", "Ranking", "Revision"))
 NUMBERED = {SAMPLES, PARAMETERS, RESIDUALS, FORCES, REVISION}
 """Messages that say which samples they are about."""
@@ -19,7 +21,7 @@ CHANNELS, CLOCK = {carrier.type for carrier in CARRIERS.values()}, "rosgraph_msg
 WITHOUT_STAMP = {TEST, "crash_msgs/msg/Answer", "crash_msgs/msg/Attendance"}
 STAMPED = NUMBERED | NAMED | {
     *CHANNELS, CLOCK, RANKING, "crash_msgs/msg/Misfit", "crash_msgs/msg/Event", "crash_msgs/msg/EstimatorState",
-    "crash_msgs/msg/ReplayState", "diagnostic_msgs/msg/DiagnosticArray",
+    "crash_msgs/msg/ReplayState", DIAGNOSTICS,
 }  # fmt: skip
 """Messages that begin with a stamp."""
 SAID_BY_NODE = {"crash_msgs/msg/Answer", "crash_msgs/msg/Attendance"}
@@ -30,25 +32,36 @@ BEGINNING = 4
 
 
 class Choice(NamedTuple):
-    """Names or patterns such as /kalman/*, with or without the first slash."""
+    """Names or patterns: /sled_a/kalman/* of the whole graph, kalman/* of the recorder's own namespace."""
 
     topics: Sequence[str] = ()  # none: all but those that hold what `samples` and the blocks hold as well
     exclude: Sequence[str] = ()
+    namespace: str = "/"
+    regex: str = ""  # regular expressions, searched for in a topic's full name
+    exclude_regex: str = ""
 
-    def wants(self, name: str, kind: str) -> bool:
+    def wants(self, name: str, kind: str, own: bool = True) -> bool:
+        """own: whether the topic is of the recorder's namespace; of another one it has to be asked for in full."""
         if kind not in STAMPED | WITHOUT_STAMP or (kind in CHANNELS and "/channels/" not in name):
             return False
-        chosen = fits(name, self.topics) if self.topics else kind not in CHANNELS | NAMED | {CLOCK}
-        return chosen and not fits(name, self.exclude)
+        topics = [pattern for pattern in self.topics if own or pattern.startswith("/")]
+        chosen = self.fits(name, topics) or (own and _found(self.regex, name))
+        if own and not (self.topics or self.regex):
+            chosen = kind not in CHANNELS | NAMED | {CLOCK}
+        return chosen and not (self.fits(name, self.exclude) or _found(self.exclude_regex, name))
 
     def in_vain(self, names: Iterable[str]) -> list[str]:
         """Those of `topics` that no recorded topic fits."""
         names = list(names)
-        return [pattern for pattern in self.topics if not any(fits(name, [pattern]) for name in names)]
+        return [pattern for pattern in self.topics if not any(self.fits(name, [pattern]) for name in names)]
+
+    def fits(self, name: str, patterns: Sequence[str]) -> bool:
+        relative = name.removeprefix(f"{self.namespace.rstrip('/')}/")
+        return any(fnmatchcase(name, pattern) or fnmatchcase(relative, pattern) for pattern in patterns)
 
 
-def fits(name: str, patterns: Sequence[str]) -> bool:
-    return any(fnmatchcase(name, pattern) or fnmatchcase(name, f"/{pattern}") for pattern in patterns)
+def _found(regex: str, name: str) -> bool:
+    return bool(regex) and re.search(regex, name) is not None
 
 
 def stamp_of(data: bytes) -> int:

@@ -16,6 +16,7 @@ from mcap.records import Metadata
 
 from .bag_writer import LATCHED, STREAM, BagWriter, TopicToWrite
 from .message_types import typestore
+from .qos import EVENTS
 from .recorded_topics import RANKING, REVISION, SAID_BY_NODE, STAMPED, sayer_of, stamp_of
 from .whole_file import WholeFile
 
@@ -23,9 +24,9 @@ SHOWN_AFTER = 0.15
 """s after which a message is in the file, at the next message or look."""
 ON_DISK_AFTER = 5.0
 """s after which the system is told to bring the file onto the disk."""
-REMEMBERED = 2000
-"""Messages of a topic that its publisher keeps for late joiners; the publishers of this project keep 200 at most."""
-KEPT_IN_NUMBER = {RANKING, "crash_msgs/msg/Misfit", REVISION}
+REMEMBERED = 2 * EVENTS.depth
+"""Messages of a topic that its publisher keeps for late joiners, and more than any publisher of this project does."""
+KEPT_IN_NUMBER = {RANKING, "crash_msgs/msg/Misfit", REVISION, "crash_msgs/msg/Event"}
 """Types of latched topics of which more than the last message is kept."""
 METADATA = "crash_replay"
 """The record that says whether the recording is complete, and what is missing."""
@@ -37,6 +38,7 @@ class Heard(NamedTuple):
     name: str
     type: str
     latched: bool
+    own: bool = True  # of the recorder's namespace
 
 
 class Repeats:

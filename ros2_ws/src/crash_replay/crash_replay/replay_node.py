@@ -3,14 +3,13 @@
 import math
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from threading import Thread
-from typing import Any
+from typing import Any, TypeVar
 
 import rclpy
 from crash_msgs.srv import Burst, Seek, SetRate, Step
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.exceptions import ParameterException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -23,54 +22,76 @@ from .console import Console, wanted
 from .fault import guarded, tell
 from .health import HealthReport
 from .middleware import prepare_middleware
-from .node_parameters import ParameterError, checked, declare_parameters, names_in
+from .node_parameters import declare_parameters, follow_changes, names_in
 from .pacing import Outcome, Pacing
 from .player import SECOND, CommandError, Player
 from .readers import read_source
-from .replay_command import LIVE, PARAMETERS, window_of
 from .replay_health import replay_health
+from .replay_parameters import PARAMETERS, window_of
 from .replay_topics import ReplayTopics
 from .ros_runtime import spin
+from .rosbag2_services import serve_as_rosbag2
 from .said import say
 from .samples_again import serve_samples
-from .selection import SelectionError, samples_within, select_channels
+from .selection import samples_within, select_channels
+
+Other = TypeVar("Other", bound=Node)
+
+TRIGGERS = {
+    "pause": Player.pause,
+    "resume": Player.resume,
+    "toggle": Player.toggle,
+    "toggle_paused": Player.toggle,  # as rosbag2 calls it
+}
 
 
 class ReplayNode(Node):
     """The replay's parameters, topics and services; `pacing` does what they ask for."""
 
-    def __init__(self) -> None:
-        super().__init__("replay", automatically_declare_parameters_from_overrides=True)
-        self.asked = declare_parameters(self, PARAMETERS, LIVE)
+    def __init__(self, **options) -> None:
+        """options: of rclpy's Node."""
+        super().__init__("replay", automatically_declare_parameters_from_overrides=True, **options)
+        self.asked = declare_parameters(self, PARAMETERS)
         asked = self.asked
-        recording = select_channels(read_source(asked["bag"]), names_in(asked["channels"]), names_in(asked["exclude"]))
+        self.outcome: Outcome | None = None  # when it is over
+        self.then = names_in(asked["then"])
+        for source in self.then:
+            read_source(source)  # what is wrong with it is said now, not when its turn has come
+        chosen = names_in(asked["channels"]), names_in(asked["exclude"]), asked["regex"], asked["exclude_regex"]
+        recording = select_channels(read_source(asked["bag"]), *chosen)
         window = samples_within(window_of(asked), recording.time_ns)
         player = Player(recording.time_ns, asked["rate"], asked["loop"], *window)
         self.topics = topics = ReplayTopics(
             self, recording, asked["clock"], asked["answer_timeout"] if asked["lockstep"] else None
         )
         self.pacing = Pacing(recording, player, topics, self.asked["block"])
-        for command in (Player.pause, Player.resume, Player.toggle):
-            self.create_service(Trigger, f"~/{command.__name__}", self._on_trigger(command))
+        for name, command in TRIGGERS.items():
+            self.create_service(Trigger, f"~/{name}", self._on_trigger(command))
+        serve_as_rosbag2(self, asked["rosbag2_services"])
         self.create_service(Step, "~/step", self._on_step)
         self.create_service(Seek, "~/seek", self._on_seek)
         self.create_service(SetRate, "~/set_rate", self._on_set_rate)
         self.create_service(Burst, "~/burst", self._on_burst)
         serve_samples(self, recording)
         HealthReport(self, "pace", partial(replay_health, self.pacing, topics.audience))
-        self.add_on_set_parameters_callback(self._on_parameters)
+        follow_changes(self, PARAMETERS, self._change)
 
     def replay(self) -> Outcome:
         """All of it, in the calling thread."""
         keyboard, progress = (wanted(self.asked[k], s) for k, s in (("keyboard", sys.stdin), ("progress", sys.stderr)))
-        with Console(self.pacing, self._set, keyboard, progress):
+        with Console(self.pacing, self.set, keyboard, progress):
             names = names_in(self.asked["listeners"])
             self.pacing.wait_for_subscribers(self.asked["wait_for"], self.asked["wait_timeout"], names)
             self.pacing.start(self.asked["start_paused"], self.asked["delay"])
-            self.pacing.play(self.asked["keep_alive"])
-            return self.pacing.finish(self.asked["finish_timeout"])
+            self.pacing.play(self.asked["keep_alive"] and not self.then)
+            self.outcome = self.pacing.finish(self.asked["finish_timeout"])
+        return self.outcome
 
-    def _set(self, values: dict[str, Any]) -> str:
+    def was_stopped(self) -> bool:
+        """By a signal, a key or the service, and not by the recording's end."""
+        return self.pacing.stopped or self.outcome is None or self.outcome.stopped
+
+    def set(self, values: dict[str, Any]) -> str:
         """Set parameters together; why not, or nothing."""
         result = self.set_parameters_atomically([Parameter(name, value=value) for name, value in values.items()])
         return "" if result.successful else result.reason
@@ -119,14 +140,10 @@ class ReplayNode(Node):
         response.message = f"rate {self.pacing.player.rate:g}" if result.successful else result.reason
         return response
 
-    def _on_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Follow a change of what may be changed at any time; nothing of it where one part cannot be."""
-        try:
-            new = {p.name: checked(PARAMETERS, p.name, p.value) for p in parameters if p.name in LIVE}
-            asked = self.asked | new
-            window = samples_within(window_of(asked), self.pacing.player.time_ns)
-        except (ParameterError, SelectionError) as error:
-            return SetParametersResult(successful=False, reason=str(error))
+    def _change(self, new: dict[str, Any]) -> None:
+        """Raises SelectionError where the window has no sample."""
+        asked = self.asked | new
+        window = samples_within(window_of(asked), self.pacing.player.time_ns)
         self.asked = asked
         if "rate" in new:
             self.pacing.command(Player.set_rate, new["rate"])
@@ -134,26 +151,54 @@ class ReplayNode(Node):
             self.pacing.command(Player.set_loop, new["loop"])
         if new.keys() & {"from", "until"}:
             self.pacing.command(Player.set_window, *window)
-        return SetParametersResult(successful=True)
 
 
 def main() -> int:
-    return guarded(_main, also=(ParameterException,))
+    return guarded(replay_in_turn, also=(ParameterException,))
 
 
-def _main() -> int:
+def replay_in_turn() -> int:
+    """The recording and those after it, each by a node of its own -> exit status."""
+    made: list[ReplayNode] = []
+
+    def make(**given: Any) -> ReplayNode:
+        overrides = [Parameter(name, value=value) for name, value in given.items()]
+        made.append(ReplayNode(parameter_overrides=overrides))
+        return made[-1]
+
+    status = replay_beside(make=make)
+    for k, source in enumerate(then := made[0].then, start=1):
+        if made[-1].was_stopped():
+            break
+        status = max(status, replay_beside(make=partial(make, bag=source, then=then[k:] or [""])))
+    return status
+
+
+def replay_beside(
+    make_others: Callable[[], Sequence[Other]] = tuple,
+    make: Callable[[], ReplayNode] = ReplayNode,
+    hear_out: Callable[[ReplayNode, Sequence[Other]], int] = lambda node, others: 0,
+    arguments: Sequence[str] | None = None,
+) -> int:
+    """A replay, with other nodes in the same process, till it is over -> exit status.
+
+    hear_out: what the others still have to do when the replay has gone, and the exit status for it; arguments: for all
+    nodes, where it is not the command line.
+    """
     prepare_middleware()
     # Ctrl-C must end the replay between two messages, not take the context away under it.
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node = ReplayNode()
+        others = make_others()
+        node = make()
     except BaseException:
         rclpy.shutdown()
         raise
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: setattr(node.pacing, "stopped", True))
     executor, done = EventsExecutor(), Future()
-    executor.add_node(node)
+    for one in (node, *others):
+        executor.add_node(one)
     services = Thread(target=spin, args=(executor, done))
     services.start()
     try:
@@ -161,14 +206,16 @@ def _main() -> int:
         say(outcome.text)
         for line in outcome.lacking:
             tell(f"incomplete: {line}")
-        return 1 if outcome.lacking else 0
+        node.topics.audience.leave()
+        return max(1 if outcome.lacking else 0, hear_out(node, others))
     finally:
         node.topics.audience.leave()
         done.set_result(None)
         executor.wake()
         services.join()
         executor.shutdown()
-        node.destroy_node()
+        for one in (node, *others):
+            one.destroy_node()
         rclpy.shutdown()
 
 

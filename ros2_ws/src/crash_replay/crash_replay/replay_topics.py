@@ -6,7 +6,6 @@ from functools import partial
 from crash_msgs.msg import Answer, ReplayState, Samples, TestInfo
 from rclpy.node import Node
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from rosgraph_msgs.msg import Clock
 
 from .attending import Progress
 from .audience import Audience
@@ -15,6 +14,7 @@ from .lockstep import Answered, Listeners, Lockstep
 from .player import SECOND, Batch, Mode, Player, Tally
 from .qos import LATCHED, SAID, STREAM
 from .recording import Recording
+from .replay_clock import ReplayClock
 from .ros_messages import channel_to_msg, channel_type, samples_to_msg, stamp, test_to_msg, time_zero_ns
 from .subscribers import UNNAMED, node_name, process_of, waited_for
 
@@ -22,14 +22,15 @@ OVERRIDABLE = QoSOverridingOptions.with_default_policies()
 
 
 class ReplayTopics:
-    def __init__(self, node: Node, recording: Recording, with_clock: bool, answer_timeout: float | None = None):
-        """answer_timeout: s after which lock-step goes on without a silent listener; None: no lock-step."""
+    def __init__(self, node: Node, recording: Recording, clock: str, answer_timeout: float | None = None):
+        """clock: as of ReplayClock; answer_timeout: s after which lock-step goes on without a silent listener; None: no
+        lock-step."""
         self.node, self.recording = node, recording
         self.time_zero = time_zero_ns(recording)
         self.test = node.create_publisher(TestInfo, "test", LATCHED)
         self.samples = node.create_publisher(Samples, "samples", STREAM, qos_overriding_options=OVERRIDABLE)
         self.state = node.create_publisher(ReplayState, "replay_state", LATCHED)
-        self.clock = node.create_publisher(Clock, "/clock", STREAM) if with_clock else None
+        self.clock = ReplayClock(node, clock)
         self.channels = [
             node.create_publisher(channel_type(c), f"channels/{c.name}", STREAM, qos_overriding_options=OVERRIDABLE)
             for c in recording.test.channels
@@ -44,7 +45,6 @@ class ReplayTopics:
         if answer_timeout is not None:
             self.lockstep = Lockstep(self._answering, node.get_logger().warning, answer_timeout)
             self.answers = node.create_subscription(Answer, "answers", self._on_answer, SAID)
-        self.last_time_ns = int(recording.time_ns[0])  # of the last sample sent
         self.run, self.first = -1, 0  # the pass that is being sent, and its first sample
         self.audience = Audience(node, self.samples)
         self.find_subscribers()
@@ -88,25 +88,23 @@ class ReplayTopics:
 
     def find_subscribers(self) -> None:
         """Look who listens: what nobody listens to is not made."""
-        self.clock_heard = self.clock is not None and self.clock.get_subscription_count() > 0
+        self.clock.look()
         self.heard = [k for k, publisher in enumerate(self.channels) if publisher.get_subscription_count()]
         if self.lockstep:
             self.lockstep.find_listeners()
 
     def _flowing(self) -> list:
-        return [self.samples, *(self.channels[k] for k in self.heard), *([self.clock] if self.clock_heard else [])]
+        return [self.samples, *(self.channels[k] for k in self.heard), *self.clock.heard]
 
     def send(self, batch: Batch) -> None:
-        """The samples of a batch, the clock at the last of them, and each heard channel's values."""
+        """The clock at the last sample of a batch, its samples, and each heard channel's values."""
         if batch.run != self.run:
             self.run, self.first = batch.run, batch.start
         if self.lockstep:
             self.lockstep.expect(batch.run, batch.stop - 1)
         message = samples_to_msg(self.recording, batch.start, batch.stop, batch.run, self.time_zero)
+        self.clock.tell(self.time_zero + self.recording.time_ns.item(batch.stop - 1))
         self.samples.publish(message)
-        self.last_time_ns = self.recording.time_ns.item(batch.stop - 1)
-        if self.clock_heard:
-            self.clock.publish(Clock(clock=stamp(self.time_zero + self.last_time_ns)))
         if self.heard:
             self._send_channels(batch)
         count = batch.stop - batch.start
@@ -144,5 +142,6 @@ class ReplayTopics:
             first=self.first if player.run == self.run else player.next,
             listeners=self.audience.look(reached),
         )
+        self.clock.tell(self.time_zero + position_ns)  # it ticks while nothing is sent, too
         message.header.stamp = stamp(self.time_zero + position_ns)
         self.state.publish(message)

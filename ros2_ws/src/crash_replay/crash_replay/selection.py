@@ -1,5 +1,6 @@
 """Which part of a recording is replayed: its channels by name, its samples by time."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from difflib import get_close_matches
@@ -53,22 +54,47 @@ def _ns(seconds: float) -> float:
     return float(round(seconds * SECOND)) if np.isfinite(seconds) else seconds
 
 
-def select_channels(recording: Recording, wanted: Sequence[str] = (), excluded: Sequence[str] = ()) -> Recording:
-    """The recording with the channels that `wanted` (none: all) names and `excluded` does not.
+def select_channels(
+    recording: Recording,
+    wanted: Sequence[str] = (),
+    excluded: Sequence[str] = (),
+    regex: str = "",
+    exclude_regex: str = "",
+) -> Recording:
+    """The recording with the channels that `wanted` or `regex` choose (neither: all), less the excluded ones.
 
-    Both hold names and patterns of the shell's kind, such as rib_*. Raises SelectionError where one fits no channel.
+    The lists hold names and patterns of the shell's kind, such as rib_*; regular expressions are searched for in names.
+    Raises SelectionError where one fits no channel, where an expression is none, and where nothing is left.
     """
     names = recording.test.channel_names
-    kept = _fitting(names, wanted, "channels") if wanted else set(names)
-    kept -= _fitting(names, excluded, "exclude")
+    chosen = _fitting(names, wanted, "channels") | _found(names, regex, "regex")
+    kept = chosen if wanted or regex else set(names)
+    kept -= _fitting(names, excluded, "exclude") | _found(names, exclude_regex, "exclude_regex")
     if not kept:
-        raise SelectionError("no channel is left of channels and exclude: name fewer in exclude")
+        raise SelectionError("no channel is left of what is chosen: exclude fewer")
     if len(kept) == len(names):
         return recording
     columns = [k for k, name in enumerate(names) if name in kept]
     channels = tuple(recording.test.channels[k] for k in columns)
     values = np.ascontiguousarray(recording.values[:, columns])
     return replace(recording, test=replace(recording.test, channels=channels), values=values)
+
+
+def regular_expression(text: str, parameter: str) -> re.Pattern:
+    """Raises SelectionError where it is none."""
+    try:
+        return re.compile(text)
+    except re.error as error:
+        raise SelectionError(f"parameter {parameter} must be a regular expression, got {text!r}: {error}") from None
+
+
+def _found(names: Sequence[str], text: str, parameter: str) -> set[str]:
+    pattern = regular_expression(text, parameter)
+    found = {name for name in names if text and pattern.search(name)}
+    if text and not found:
+        there = ", ".join(names)
+        raise SelectionError(f"parameter {parameter}: {text!r} is found in no channel's name: there are {there}")
+    return found
 
 
 def _fitting(names: Sequence[str], patterns: Sequence[str], parameter: str) -> set[str]:

@@ -8,6 +8,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import process_time
 from typing import NamedTuple
 
@@ -19,10 +20,11 @@ from crash_replay.recording import Recording, RecordingError
 from crash_replay.said import Parser, say
 
 from ..core.diagnosis import EFFECT_MISSING, Diagnosis, diagnose
-from ..core.structure import ModelError
+from ..core.structure import ModelError, Structure
 from ..figures import markdown_table, write_markdown
 from ..model_file import load_model
 from .effects_results import ONE_THREAD
+from .outside_systems import other_systems
 
 HEAD = """# Recordings that nobody here made
 
@@ -46,15 +48,16 @@ WITHIN_OF_DAMPER, WITHIN_OF_ENGINE = 0.1, 0.25
 
 class Case(NamedTuple):
     name: str
-    files: tuple[Path, ...]
-    model: str
+    recordings: Callable[[], list[Recording]]
+    model: str  # a ready one, or a model file's text
     truth: str
     right: Callable[[Diagnosis], bool]
-    cfc: int | None = None  # filtered before, too
+    besides: Callable[[Diagnosis], str] = lambda found: ""  # what else is told of it
 
 
 def cases(data: Path) -> Iterator[Case]:
     """Of what the folder has."""
+    yield from other_systems(data / "outside")
     for file in sorted((data / "cyberdiver").glob("*.csv")):
         yield _impactor((file,))
     pair = [data / "cyberdiver" / f"linear_damped__15npmm_{speed}mps_025damping_trial1.csv" for speed in (4, 6)]
@@ -62,8 +65,9 @@ def cases(data: Path) -> Iterator[Case]:
         yield _impactor(tuple(pair))
     car = data / "nhtsa-10146"
     if car.exists():
-        for cfc in (None, 60):
-            yield Case("NHTSA 10146", (car,), "frontal_single", "an engine of 400 kg", _is_engine, cfc)
+        yield Case("NHTSA 10146", lambda: [read_source(car)], "frontal_single", "an engine of 400 kg", _is_engine)
+        filtered = lambda: [filter_recording(read_source(car), 60)]  # noqa: E731
+        yield Case("NHTSA 10146, CFC 60", filtered, "frontal_single", "an engine of 400 kg", _is_engine)
 
 
 def _impactor(files: tuple[Path, ...]) -> Case:
@@ -72,10 +76,20 @@ def _impactor(files: tuple[Path, ...]) -> Case:
     speeds = " and ".join(re.search(r"_(\d+)mps", file.stem)[1] for file in files)
     stiffness = re.search(r"__(\d+)npmm", stem)[1]
     name = f"impactor, {stiffness} N/mm, {speeds} m/s, {'damped' if ratio else 'undamped'}"
+    read = lambda: [read_source(file) for file in files]  # noqa: E731
     if not ratio:
-        return Case(name, files, "impactor_spring", "no damper", lambda found: not _named(found, "viscous_damping"))
+        return Case(name, read, "impactor_spring", "no damper", lambda found: not _named(found, "viscous_damping"))
     damping = float(f"{ratio[1][0]}.{ratio[1][1:]}") * DAMPING_AT_RATIO_1
-    return Case(name, files, "impactor_spring", f"a damper of {damping:.3g} N s/m", lambda f: _is_damper(f, damping))
+    return Case(name, read, "impactor_spring", f"a damper of {damping:.3g} N s/m", lambda f: _is_damper(f, damping))
+
+
+def model_of(model: str) -> Structure:
+    if "\n" not in model:
+        return load_model(model)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "model.yaml"
+        path.write_text(model, encoding="utf-8")
+        return load_model(path)
 
 
 def _named(found: Diagnosis, effect: str) -> list[float]:
@@ -95,22 +109,20 @@ def _is_engine(found: Diagnosis) -> bool:
 
 def judged(case: Case) -> list[str]:
     """Its row of the table."""
-    recordings: list[Recording] = [read_source(file) for file in case.files]
-    if case.cfc:
-        recordings = [filter_recording(recording, case.cfc) for recording in recordings]
+    recordings, model = case.recordings(), model_of(case.model)
     began = process_time()
     try:
-        found = diagnose(load_model(case.model), recordings)
+        found = diagnose(model, recordings)
     except (ModelError, RecordingError) as error:
         return [case.name, case.truth, f"error: {error}", "", "", "NO", f"{process_time() - began:.0f}"]
     seconds = process_time() - began
-    name = case.name + (f", CFC {case.cfc}" if case.cfc else "")
     steps = "; ".join(f"{s.effect} on {s.target} {s.coefficient:.3g} +- {s.std:.2g} {s.unit}" for s in found.steps)
     rivals = found.ranking[0].confounded_with[:3] if found.ranking else ()
     told = f"`{found.verdict}`" + (f": {steps}" if steps else "") + (f" (or {', '.join(rivals)})" if rivals else "")
     error = f"{found.left_before.rms / G:.3g} -> {found.left.rms / G:.3g} g, {found.left.band}"
     left = f"{100.0 * found.left.of_peak:.2g} %"
-    return [name, case.truth, told, error, left, "yes" if case.right(found) else "NO", f"{seconds:.0f}"]
+    error += f"; {more}" if (more := case.besides(found)) else ""
+    return [case.name, case.truth, told, error, left, "yes" if case.right(found) else "NO", f"{seconds:.0f}"]
 
 
 def main() -> None:
@@ -127,7 +139,9 @@ def _run(arguments) -> None:
         rows.append(judged(case))
         say(" | ".join(rows[-1]))
     if not rows:
-        raise RecordingError(f"{arguments.data}: no recording that is known here: folders cyberdiver, nhtsa-10146")
+        raise RecordingError(
+            f"{arguments.data}: no recording that is known here: folders cyberdiver, nhtsa-10146, outside"
+        )
     head = ["recording", "true", "told", "error", "left, of the peak", "right", "processor"]
     write_markdown(arguments.to, [HEAD, f"{markdown_table(head, rows)}\n"])
 

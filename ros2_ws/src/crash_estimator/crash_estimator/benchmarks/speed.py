@@ -2,7 +2,6 @@
 
 import argparse
 import os
-import platform
 import sys
 import tempfile
 import time
@@ -14,11 +13,12 @@ from crash_replay.output import check_outputs
 from crash_replay.said import Parser, say
 
 from ..demo.domain import own_environment
-from ..figures import markdown_table, write_markdown
+from ..figures import write_markdown
 from ..tables import table
 from .speed_graph import start_ros
 from .speed_growth import growth
 from .speed_live import Effort, Live
+from .speed_page import renewed_page, whole_page
 from .speed_row import HEAD, Row
 from .speed_start import starts
 from .speed_steps import steps
@@ -28,17 +28,6 @@ QUICK = Effort(
     lockstep=2,
 )  # fmt: skip
 PARTS = ("start", "steps", "growth", "throughput", "latency", "jitter", "viewer", "named", "real_time", "lockstep")
-
-ABOUT = """\
-# Speed
-
-Made by `make benchmark` on {machine}, {cores} cores, load {load:.1f} before it began; {when}.
-
-Each row is measured beside its reference in the same run, in turns; a ratio holds on another machine, a time does not.
-A machine that does other work makes every row worse, those with several processes most. Throughputs are medians of
-six passes in turns with the reference's, their ratio is the median of the six ratios. The processor times of
-commands are medians of five starts.
-"""
 
 
 def main() -> None:
@@ -51,6 +40,7 @@ def _parser() -> Parser:
     parser.add_argument("--quick", action="store_true", help="see that it works; the figures say little")
     parser.add_argument("--hold", type=float, default=Effort.hold, help="s that the highest rate must be held")
     parser.add_argument("--only", nargs="*", choices=PARTS, default=PARTS, help="some of the rows; no page is written")
+    parser.add_argument("--renew", action="store_true", help="with --only: these rows are put into the page there is")
     return parser
 
 
@@ -65,10 +55,9 @@ def benchmark(arguments: argparse.Namespace) -> None:
             rows += part()
     say(table(HEAD, [row.cells() for row in rows]))
     if tuple(arguments.only) == PARTS:
-        here = {"machine": platform.machine(), "cores": os.cpu_count()}
-        about = ABOUT.format(**here, load=load, when=time.strftime("%Y-%m-%d"))
-        page = [about, markdown_table(HEAD, [row.cells() for row in rows]), ""]
-        say(write_markdown(page_file, page))
+        say(write_markdown(page_file, whole_page(rows, load)))
+    elif arguments.renew:
+        say(write_markdown(page_file, renewed_page(page_file.read_text(encoding="utf-8"), rows, load)))
 
 
 def _parts(folder: Path, effort: Effort, arguments) -> Iterator[tuple[str, Callable[[], list[Row]]]]:

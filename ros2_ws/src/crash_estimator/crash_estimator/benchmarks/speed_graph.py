@@ -5,6 +5,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -56,16 +57,20 @@ class Listener(Node):
         self.counts = {name: dict.fromkeys(TOPICS, 0) for name in names}
         self.first = self.last = 0.0
         self.arrival: dict[int, float] = {}  # number -> when the parameters came
+        self.by_name = {"parameters": 0, "residuals": 0}  # messages of the named form
         for name in names:
             for topic, kind in TOPICS.items():
                 take = lambda message, name=name, topic=topic: self._take(name, topic, message)  # noqa: E731
                 self.create_subscription(kind, f"{name}/{topic}", take, EVERY_SAMPLE)
 
-    def hear_named(self) -> None:
-        """What is said by name too; it is not counted."""
+    def hear_by_name(self) -> None:
+        """What is said by name, too: it counts, and does not change when the last of the blocks came."""
         for name in self.counts:
             for topic, kind in (("parameters", Parameters), ("residuals", Residuals)):
-                self.create_subscription(kind, f"{name}/{topic}", lambda message: None, EVERY_SAMPLE)
+                self.create_subscription(kind, f"{name}/{topic}", partial(self._count, topic), EVERY_SAMPLE)
+
+    def _count(self, topic: str, _: Parameters | Residuals) -> None:
+        self.by_name[topic] += 1
 
     def _take(self, name: str, topic: str, message: ParametersBlock | ResidualsBlock) -> None:
         self.last = time.perf_counter()

@@ -28,6 +28,7 @@ BEGINNINGS: Mapping[str, Sequence[str]] = {
     "simulate": OF_A_MODEL,
     "estimator": ("--ros-args", "-p", "model:=nothing.yaml"),
     "diagnosis": ("--ros-args", "-p", "model:=nothing.yaml"),
+    "composed": ("one", "--ros-args", "-p", "one:model:=nothing.yaml"),
     "viewer": ("--ros-args", "-p", "port:=-1"),
 }
 """Arguments with which each ends as soon as all is imported and its node is made: what it would begin with is missing.

@@ -1,36 +1,13 @@
-"""What live.launch.py takes from launch and launch_ros, which do not come as wheels: the same words, standing in for
-them.
+"""What live.launch.py takes from launch and launch_ros, which do not come as wheels: the same words, standing in."""
 
-A value that is only known when it is launched is asked with `value(given)`, the launch's arguments by name.
-"""
-
+import json
 import runpy
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import Any, get_origin
-
-from ruamel.yaml import YAML
-
-TRUTHS = {"true": True, "1": True, "false": False, "0": False}
-
-
-class LaunchConfiguration:
-    def __init__(self, name: str):
-        self.name = name
-
-    def value(self, given):
-        return given[self.name]
-
-
-class PythonExpression:
-    def __init__(self, parts):
-        self.parts = parts
-
-    def value(self, given):
-        return str(eval("".join(part if isinstance(part, str) else part.value(given) for part in self.parts)))
+from typing import Any
 
 
 class LaunchContext:
@@ -58,55 +35,43 @@ class EmitEvent:
         self.event = event
 
 
-class ParameterValue:
-    def __init__(self, value, *, value_type):
-        self.of, self.value_type = value, value_type
-
-    def value(self, given):
-        value = self.of.value(given)
-        if get_origin(self.value_type) is list:
-            value = YAML(typ="safe").load(value)
-            assert isinstance(value, list) and all(isinstance(one, str) for one in value)
-            return value
-        return value.lower() == "true" if self.value_type is bool else self.value_type(value)
-
-
-class IfCondition:
-    def __init__(self, predicate):
-        self.predicate = predicate
-
-    def holds(self, given):
-        return TRUTHS[self.predicate.value(given).lower()]
-
-
 class DeclareLaunchArgument:
     def __init__(self, name, *, default_value=None, description=None):
         self.name, self.default_value, self.description = name, default_value, description
 
 
-class Node:
-    def __init__(self, *, package, executable, output=None, parameters=(), condition=None):
-        self.package, self.executable, self.parameters, self.condition = package, executable, parameters, condition
+class OpaqueFunction:
+    def __init__(self, *, function):
+        self.function = function
 
-    def values(self, given) -> dict[str, Any]:
-        return {
-            name: value.value(given) if hasattr(value, "value") else value
-            for parameters in self.parameters
-            for name, value in parameters.items()
-        }
+
+class Node:
+    def __init__(self, *, package, executable, name=None, namespace=None, output=None, arguments=(), ros_arguments=()):
+        self.package, self.executable, self.name, self.namespace = package, executable, name, namespace
+        self.arguments, self.ros_arguments = list(arguments), list(ros_arguments)
+
+    def parameters(self) -> dict[str, Any]:
+        """What is set by `-p`."""
+        words = [word for option, word in zip(self.ros_arguments, self.ros_arguments[1:]) if option == "-p"]
+        return {name: json.loads(value) for name, value in (word.split(":=", 1) for word in words)}
+
+    def words(self) -> list[str]:
+        """Of its command, behind the executable."""
+        names = {"__node": self.name, "__ns": self.namespace and f"/{self.namespace.strip('/')}"}
+        remapped = [word for key, value in names.items() if value for word in ("-r", f"{key}:={value}")]
+        return [*self.arguments, "--ros-args", *self.ros_arguments, *remapped]
 
 
 MODULES = {
     "launch": {"LaunchDescription": list, "LaunchContext": LaunchContext},
-    "launch.actions": {one.__name__: one for one in (DeclareLaunchArgument, EmitEvent, RegisterEventHandler)},
-    "launch.conditions": {"IfCondition": IfCondition},
+    "launch.actions": {
+        one.__name__: one for one in (DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler)
+    },
     "launch.event_handlers": {"OnProcessExit": OnProcessExit},
     "launch.events": {"Shutdown": Shutdown},
     "launch.events.process": {"ProcessExited": SimpleNamespace},
-    "launch.substitutions": {one.__name__: one for one in (LaunchConfiguration, PythonExpression)},
     "launch_ros": {},
     "launch_ros.actions": {"Node": Node},
-    "launch_ros.parameter_descriptions": {"ParameterValue": ParameterValue},
 }
 
 
@@ -138,7 +103,6 @@ def arguments_of(entities: list) -> dict[str, str | None]:
     return {one.name: one.default_value for one in entities if isinstance(one, DeclareLaunchArgument)}
 
 
-def started(entities: list, given: dict[str, str]) -> list[Node]:
-    """The nodes that these arguments ask for."""
-    nodes = [one for one in entities if isinstance(one, Node)]
-    return [node for node in nodes if node.condition is None or node.condition.holds(given)]
+def carried_out(entities: list, context: LaunchContext) -> list:
+    """The nodes and handlers that the launch's arguments ask for, in their order."""
+    return [found for one in entities if isinstance(one, OpaqueFunction) for found in one.function(context)]

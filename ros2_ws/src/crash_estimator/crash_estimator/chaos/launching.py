@@ -17,12 +17,12 @@ from types import SimpleNamespace
 from ament_index_python.packages import get_package_share_directory
 
 from crash_replay.fault import guarded, tell
+from crash_replay.processes import end_with
 from crash_replay.recording import RecordingError
 from crash_replay.said import say
 from crash_replay.starting import held
 
-from ..demo.children import end_with
-from .launch_words import LaunchContext, Node, RegisterEventHandler, arguments_of, described, started
+from .launch_words import LaunchContext, Node, RegisterEventHandler, arguments_of, carried_out, described
 from .members import node_command, send
 
 LOOK = 0.02
@@ -38,9 +38,10 @@ def launch_file() -> Path:
 class Launch:
     def __init__(self, entities: list, given: dict[str, str]):
         self.context = LaunchContext(arguments_of(entities) | given)
-        handlers = [one.event_handler for one in entities if isinstance(one, RegisterEventHandler)]
+        found = carried_out(entities, self.context)
+        handlers = [one.event_handler for one in found if isinstance(one, RegisterEventHandler)]
         self.handlers = {id(handler.target_action): handler.on_exit for handler in handlers}
-        self.nodes = started(entities, self.context.launch_configurations)
+        self.nodes = [one for one in found if isinstance(one, Node)]
         self.running: list[tuple[Node, subprocess.Popen]] = []
         self.status, self.shut_down_at, self.interrupted = 0, 0.0, False
 
@@ -65,8 +66,7 @@ class Launch:
         return time.monotonic() - self.shut_down_at
 
     def _start(self, node: Node) -> subprocess.Popen:
-        values = node.values(self.context.launch_configurations)
-        command = node_command(node.package, node.executable, node.executable, **values)
+        command = node_command(node.package, node.executable) + node.words()
         with held():
             return subprocess.Popen(command, preexec_fn=partial(end_with, os.getpid()))
 
@@ -98,7 +98,10 @@ def _main() -> int:
     entities = described(launch_file())
     if unknown := given.keys() - arguments_of(entities).keys():
         raise RecordingError(f"no such argument of the launch: {', '.join(sorted(unknown))}")
-    launch = Launch(entities, given)
+    try:
+        launch = Launch(entities, given)
+    except Exception as error:  # as launch, whatever the launch file raises
+        raise RecordingError(str(error)) from None
     signal.signal(signal.SIGINT, lambda *_: setattr(launch, "interrupted", True))
     return launch.run()
 

@@ -17,10 +17,8 @@ from threading import Thread
 
 from ament_index_python.packages import get_package_prefix
 
-from crash_replay.processes import has_ended
+from crash_replay.processes import end_with, has_ended
 from crash_replay.starting import held
-
-from ..demo.children import end_with
 
 LOOK = 0.05
 """s between two looks whether a terminal is to be closed."""

@@ -6,7 +6,6 @@ files: after an update it would go on running old code. Import this before defin
 
 import hashlib
 import os
-import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,15 +13,17 @@ from pathlib import Path
 from numba import config
 from numba.core.event import Event, Listener, install_listener
 
+INDEPENDENT = {"diagnosis", "effects"}
+"""Folders of the core that the compiled recursion takes nothing from; numba sees each change of what they compile
+but those of constants from another file."""
+CONSTANTS = ("diagnosis/parameterization/layout.py",)
+"""Files within that have such constants."""
+
 
 def sources(core: Path) -> list[Path]:
-    """The files of the compiled recursion, and those that it takes constants from: after any other change the code that
-    is there goes on being used. (The compiled functions elsewhere, of diagnosis and effects, take nothing from others.)
-    """
-    texts = {file: file.read_text() for file in sorted((core / "compiled").glob("*.py"))}
-    compiled = [file for file, text in texts.items() if "@njit" in text]
-    names = {name for file in compiled for name in re.findall(r"^from \.\.([\w.]+) import", texts[file], re.MULTILINE)}
-    return [*compiled, *(core.joinpath(*name.split(".")).with_suffix(".py") for name in sorted(names))]
+    """The files after whose change all is compiled anew."""
+    others = (path for path in core.rglob("*.py") if not INDEPENDENT & set(path.relative_to(core).parts))
+    return sorted([*others, *(core / name for name in CONSTANTS)])
 
 
 def _fingerprint(core: Path) -> str:

@@ -28,8 +28,7 @@ class ElementState(IntEnum):
 class Event(NamedTuple):
     """Something happened at a sample."""
 
-    # loading | unloading | apart | clamped | rewound | jump | orders | released | masses | lost | dropout | effect |
-    # reset
+    # loading | unloading | apart | clamped | rewound | jump | orders | released | masses | lost | dropout | effect
     kind: str
     target: str  # element, parameter, equation or channel
     value: float  # crush in m, index steps, probability: as the text says

@@ -6,13 +6,16 @@ Driven bodies move as their channels say; elements whose crush is a channel foll
 sample by sample need not hold here: errors of the force add up in velocity and displacement.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from crash_replay.recording import Recording
+
 from .actions import beside_the_springs, coefficients
 from .characteristic import Characteristic, characteristics
+from .derived_motion import between_samples
 from .effects.effect import ElementMotion
 from .estimate import Description, Estimate
 from .rating import Rating, rate
@@ -53,18 +56,21 @@ def free_run(
     estimates: Sequence[Estimate],
     given: tuple[Characteristic, ...] | None = None,
     end: float = np.inf,
+    recording: Recording | None = None,
 ) -> FreeRun:
     """Simulate over the samples from time zero to `end` s.
 
     The start and the driven motion are those of `estimates`; the characteristics are theirs too unless `given`,
-    from another test for instance. Raises ModelError where nothing is left to simulate.
+    from another test for instance; recording: that of the estimates, for the forces that are applied to free bodies.
+    Raises ModelError where nothing is left to simulate.
     """
     after = [e for e in estimates if 0 <= e.time_ns * 1e-9 <= end]
     if len(after) < 2:
         raise ModelError(f"a free run needs at least two samples from time zero to {end:g} s, found {len(after)}")
     laws = given or characteristics(structure, description, estimates)
     time = np.array([e.time_ns for e in after]) * 1e-9
-    run = _System(structure, laws, coefficients(structure, description, after[-1]), time, after)
+    applied = _applied(structure, recording)
+    run = _System(structure, laws, coefficients(structure, description, after[-1]), time, after, applied)
     x, v = after[0].displacement.copy(), after[0].velocity.copy()
     state = run.start(time[0], x, v)
     states = [state]
@@ -105,9 +111,9 @@ class _System:
 
     def __init__(
         self, structure: Structure, laws: tuple[Characteristic, ...], c: np.ndarray, time: np.ndarray,
-        after: Sequence[Estimate],
+        after: Sequence[Estimate], applied: Mapping[int, Callable[[float], float]],
     ):  # fmt: skip
-        self.structure, self.c = structure, c
+        self.structure, self.c, self.applied = structure, c, applied
         self.laws, self.ends, self.time = laws, structure.ends, time
         self.masses = np.array([b.mass if b.free else np.inf for b in structure.bodies])
         for value, action in zip(c, structure.actions, strict=True):
@@ -185,7 +191,9 @@ class _System:
         np.add.at(loads, self.ends[:, 1], force)
         for k, host in self.carried:
             loads[host] += loads[k]
-        for value, action in zip(self.c, self.structure.actions, strict=True):
+        for k, force_at in self.applied.items():
+            loads[k] += force_at(t)
+        for value, action in zip(self.c, self.structure.actions):
             if action.kind == "body":
                 loads[action.at] += value * action.force(np.array([t]))[0]
             elif action.kind == "inertia":
@@ -224,6 +232,17 @@ class _System:
         a4 = self.pushed(t + h, state._replace(x=x + h * v3, v=v4))
         x, v = x + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4), v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
         return self.ended(t + h, x, v, state)
+
+
+def _applied(structure: Structure, recording: Recording | None) -> dict[int, Callable[[float], float]]:
+    """N of the time in s since the impact, by body."""
+    found = {}
+    for k, body in enumerate(structure.bodies):
+        if body.applied:
+            if recording is None:
+                raise ModelError(f"body {body.name} is pushed by {body.applied}: a free run needs the recording")
+            found[k] = between_samples(recording.time, recording.column(body.applied))
+    return found
 
 
 def _bridged(values: np.ndarray) -> np.ndarray:

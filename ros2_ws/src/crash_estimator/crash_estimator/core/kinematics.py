@@ -42,6 +42,7 @@ class Motion(NamedTuple):
     held: np.ndarray  # (b,) m/s^2, the last valid acceleration after the impact
     displacement_by: np.ndarray | None = None  # (b, n) its change with each of n estimated errors of channels
     velocity_by: np.ndarray | None = None  # (b, n)
+    applied: np.ndarray | None = None  # (q,) m/s^2 by the measured forces on free bodies, where there are any
 
 
 class KinematicState(NamedTuple):
@@ -79,6 +80,7 @@ class Kinematics:
 
     def __init__(self, structure: Structure, test: Test):
         structure.check_channels(test)
+        _check_accelerations(structure)
         bodies, elements = structure.bodies, structure.elements
         self.structure = structure
         self.channel_count = len(test.channels)
@@ -91,7 +93,10 @@ class Kinematics:
             (row, test.index(bodies[k].force)) for row, k in enumerate(structure.equations) if bodies[k].fixed
         ]
         self.balances = [(row, k) for row, k in enumerate(structure.equations) if bodies[k].free]
-        self.moving = np.array([bool(body.acceleration) for body in bodies])
+        self.applied_channels = [
+            (row, test.index(bodies[k].applied), bodies[k].mass)
+            for row, k in enumerate(structure.equations) if bodies[k].applied
+        ]  # fmt: skip
         self.initial_displacement, self.initial_velocity = initial_motion(structure, test)
         self.origin = np.array([element.origin for element in elements])
 
@@ -134,6 +139,7 @@ class Kinematics:
             velocity = state.velocity + 0.5 * dt * (last + now)
         crush, rate = self._crush(state, values, displacement, velocity, dt)
         measured = self._measured(values, acceleration)
+        applied = self._applied(values)
         if before_impact:
             state = self._learn_noise(state, acceleration, measured)._replace(crush=crush, rate=rate)
         else:
@@ -147,8 +153,9 @@ class Kinematics:
             )
         noise, offset_variance = self._noise(state, dt)
         return state, Motion(
-            sample.time, dt, displacement, velocity, acceleration, crush, rate, measured, noise, offset_variance, now
-        )
+            sample.time, dt, displacement, velocity, acceleration, crush, rate, measured, noise, offset_variance, now,
+            applied=applied,
+        )  # fmt: skip
 
     def _body_accelerations(self, values: np.ndarray) -> np.ndarray:
         """(b,) mean of each body's valid channels; 0 for a body without channels, NaN where all have dropped out."""
@@ -184,6 +191,15 @@ class Kinematics:
             measured[row] = values[column]
         return measured
 
+    def _applied(self, values: np.ndarray) -> np.ndarray | None:
+        """(q,) m/s^2; NaN where the channel has dropped out, which leaves no equation there."""
+        if not self.applied_channels:
+            return None
+        applied = np.zeros(len(self.structure.equations))
+        for row, column, mass in self.applied_channels:
+            applied[row] = values[column] / mass
+        return applied
+
     def _learn_offset(self, state: KinematicState, values: np.ndarray) -> KinematicState:
         valid = ~np.isnan(values)
         count = state.count + valid
@@ -206,3 +222,13 @@ class Kinematics:
         for row, body in self.balances:
             noise[row] = state.squares[body] / count
         return noise, state.squares / count * (1.0 / count + dt / RECORD)
+
+
+def _check_accelerations(structure: Structure) -> None:
+    for body in structure.bodies:
+        if body.free and not body.acceleration:
+            raise ModelError(
+                f"body {body.name} of model {structure.name} is observed by {body.motion_channel} alone: sample by "
+                "sample an acceleration channel is needed (`diagnose`, `estimate`, `simulate` and `report` derive it "
+                "from the whole recording)"
+            )

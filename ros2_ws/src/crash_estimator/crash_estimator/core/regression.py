@@ -144,6 +144,9 @@ class Regressor:
         forces = Forces(self.of_element * lever, shift)
         active = self.estimated & carries
         known = self.share @ (forces.per_unit @ self.value + shift)
+        measured = motion.measured
+        if motion.applied is not None:
+            known, measured = known + np.nan_to_num(motion.applied), measured + 0.0 * motion.applied
         gradient = np.where(active, self.share @ forces.per_unit, 0.0)
         folds = np.abs(motion.rate) * motion.dt / np.maximum(np.abs(motion.crush), SHORTEST_CRUSH)
         walk = np.where(active & ~law.on_line[self.element], self.drift_squared * folds[self.element], 0.0)
@@ -160,7 +163,7 @@ class Regressor:
             forces = Forces(np.hstack([forces.per_unit, per_unit]), shift)
         return (
             Regression(
-                known, gradient, motion.measured, active, walk, noise, motion.dt, motion.time,
+                known, gradient, measured, active, walk, noise, motion.dt, motion.time,
                 self.own_offset + per_offset, motion.offset_variance,
             ),
             forces,

@@ -4,10 +4,11 @@ x is positive in the direction the striking body travels. An element between bod
 crush X = x_a - x_b (compression positive), rate of crush V = dX/dt and force F = K X + C V
 (compression positive), which pushes a back and b forward:
 
-    M_k a_k = sum over elements of delta_k F + e_k,    delta = -1 for a, +1 for b
+    M_k a_k = sum over elements of delta_k F + P_k + e_k,    delta = -1 for a, +1 for b
 
-A free body gives one equation, divided by its mass so that measured, predicted and residual are in
-the accelerometer's m/s^2; a fixed body with a measured force gives another, in N, the force on it.
+with P_k the measured force that is applied to a free body, if there is one. A free body gives one equation, divided by
+its mass so that measured, predicted and residual are in the accelerometer's m/s^2; a fixed body with a measured force
+gives another, in N, the force on it.
 """
 
 from dataclasses import dataclass
@@ -66,7 +67,7 @@ class Structure:
         place = "bodies", body.name
         if body.free and not (body.mass and body.mass > 0):
             self._at_fault(f"body {body.name} is free and needs a mass > 0 kg", *place)
-        if not body.fixed and not body.acceleration:
+        if not body.fixed and not (body.acceleration or body.motion_channel):
             self._at_fault(f"body {body.name} names no channel for its motion", *place)
         if len(set(body.acceleration)) < len(body.acceleration):
             key = "motion" if body.driven else "acceleration"
@@ -87,7 +88,7 @@ class Structure:
     @cached_property
     def equations(self) -> tuple[int, ...]:
         """Indices of the bodies that give an equation: free with a channel, or fixed with a measured force."""
-        return tuple(k for k, b in enumerate(self.bodies) if (b.free and b.acceleration) or (b.fixed and b.force))
+        return tuple(k for k, b in enumerate(self.bodies) if b.free or (b.fixed and b.force))
 
     @cached_property
     def equation_units(self) -> tuple[str, ...]:
@@ -150,7 +151,14 @@ class Structure:
     def first_order(self) -> bool:
         """Whether springs and dampers of the first power, which may pull, and known unloading are all there is."""
         more = any(e.terms or e.unloading_slope or e.origin or e.factor or not e.damper_pulls for e in self.elements)
-        return not (more or self.actions or any(body.carried_by for body in self.bodies))
+        return not (more or self.actions or any(body.carried_by or body.applied for body in self.bodies))
+
+    def is_held(self, body: int) -> bool:
+        """Whether a spring brings the body back."""
+        return any(
+            body in ends and (element.stiffness.estimated or element.stiffness.value or element.terms)
+            for element, ends in zip(self.elements, self.ends)
+        )
 
     def reduced_mass(self, element: int) -> float:
         """Of the two bodies of an element; a driven or fixed one is infinitely heavy, a carried one its carrier."""
@@ -172,7 +180,9 @@ class Structure:
     def channels(self) -> list[tuple[str, str, str]]:
         """(wanted by, channel, quantity) for every channel that the model reads."""
         wanted = [(f"body {b.name}", name, "acceleration") for b in self.bodies for name in b.acceleration]
-        wanted += [(f"body {b.name}", b.force, "force") for b in self.bodies if b.force]
+        wanted += [(f"body {b.name}", name, "force") for b in self.bodies for name in (b.force, b.applied) if name]
+        wanted += [(f"body {b.name}", b.displacement, "displacement") for b in self.bodies if b.displacement]
+        wanted += [(f"body {b.name}", b.velocity, "velocity") for b in self.bodies if b.velocity]
         wanted += [(f"element {e.name}", e.displacement, "displacement") for e in self.elements if e.displacement]
         wanted += [(f"element {e.name}", e.velocity, "velocity") for e in self.elements if e.velocity]
         wanted += [

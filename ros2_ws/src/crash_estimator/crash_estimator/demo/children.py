@@ -1,31 +1,23 @@
 """The demonstration's processes: started side by side, watched, and ended with it."""
 
-import ctypes
 import json
-import os
 import re
-import signal
 import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 
 from ament_index_python.packages import get_package_prefix
 
 from crash_replay.output import named
+from crash_replay.processes import ends_with_this
 from crash_replay.starting import held
 
 POLITE = 16.0
 """s that a process has to end by itself: the viewer writes its file's end."""
 LOG_HEAD = re.compile(r"^\[(?P<level>\w+)\] \[[\d.]+\] \[[^]]+\]: ")
 """[INFO] [1763000000.123] [replay]: in front of what a node says."""
-
-
-LINUX = sys.platform == "linux"
-LIBC = ctypes.CDLL(None) if LINUX else None  # loaded before any fork
-SET_PARENT_DEATH_SIGNAL = 1
 
 
 class Child:
@@ -42,7 +34,7 @@ class Child:
                 stderr=subprocess.STDOUT,
                 env=dict(environment),
                 start_new_session=True,  # Ctrl-C reaches the demonstration alone, which then ends the others in order
-                preexec_fn=partial(end_with, os.getpid()) if LINUX else None,
+                preexec_fn=ends_with_this(),
             )
 
     @property
@@ -118,10 +110,3 @@ def end(children: Sequence[Child], patience: float = POLITE) -> None:
 def _yaml(value: object) -> str:
     """A parameter's value as ROS reads it: JSON is YAML, and its quotes keep a text a text."""
     return json.dumps(value)
-
-
-def end_with(parent: int) -> None:
-    """Ask Linux to end this process when the demonstration is gone, even where that was killed."""
-    LIBC.prctl(SET_PARENT_DEATH_SIGNAL, signal.SIGTERM)
-    if os.getppid() != parent:  # it was gone already
-        os._exit(1)

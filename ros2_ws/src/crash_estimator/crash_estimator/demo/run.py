@@ -38,7 +38,8 @@ CLOSING = 90.0
 
 MISSING = ("Missing effect", "which effect the model lacks, and its error, fit by fit; shaded where the model fails")
 LOOK_AT = (
-    ("Overview", "measured and predicted acceleration; the residual leaves its 99 % band where a model fails"),
+    ("Overview", "measured and predicted acceleration, force over crush; with what was added, and faded as given"),
+    ("Residuals", "what each model leaves; beyond the grey band it is more than the sensors' noise: the model fails"),
     ("Force over crush", "the loop of each element: its slope is the stiffness, what it encloses the absorbed energy"),
     ("Parameters", "stiffness with its sigma; in the lanes below, when each element loads, unloads or is apart"),
     ("Motion and states", "bodies and springs move with the time cursor: drag it through the crash"),

@@ -2,11 +2,13 @@
 
 import argparse
 import os
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from crash_replay.recording import Recording
 
+from ..viewer.native import has_display
 from .children import Children
 from .choice import (
     METHOD_OF_SEVERAL_MODELS,
@@ -47,7 +49,24 @@ def demo(arguments: argparse.Namespace) -> int:
             _start(children, bag, others, choices, rate, rrd, searches)
             from .run import Run  # takes rclpy, while the processes start, which take it too
 
-            return Run(children, choices, terminal, rrd).to_the_end()
+            status = Run(children, choices, terminal, rrd).to_the_end()
+    if rrd and rrd.is_file() and terminal.live and sys.stdin.isatty() and not has_display():
+        _stay(rrd, terminal)
+    return status
+
+
+def _stay(rrd: Path, terminal: Terminal) -> None:
+    """At a terminal without a display: the finished recording in the browser, until Ctrl-C."""
+    from ..viewer.web import WebFile  # late: it takes rerun
+
+    web = WebFile(rrd, port=9090, data_port=9876)
+    terminal.say(f"\nIn a browser on this machine: {web.page}\nCtrl-C ends it.")
+    try:
+        web.process.wait()
+    except KeyboardInterrupt:
+        terminal.say()
+    finally:
+        web.close()
 
 
 def _choices(arguments: argparse.Namespace, source: Path, recording: Recording) -> list[Choice]:
@@ -83,7 +102,7 @@ def _start(
         for old in (rrd, rrd.with_suffix(".png")):
             old.unlink(missing_ok=True)  # an older one must not pass for this one
         models = list(dict.fromkeys(choice.model for choice in choices if choice.model.endswith((".yaml", ".yml"))))
-        viewer = dict(estimators=names, models=models or [""], rrd=str(rrd.absolute()))
+        viewer = dict(estimators=names, models=models or [""], rrd=str(rrd.absolute()), web=True)
         children.start("viewer", "crash_estimator", "viewer", **viewer)
     if searches:
         same = [choice.name for choice in choices if choice.model == choices[0].model]

@@ -18,7 +18,7 @@ from crash_replay.limits import most_samples
 from crash_replay.node_parameters import checked
 from crash_replay.readers import read_source
 from crash_replay.recording import Channel, Test
-from crash_replay.replay_command import PARAMETERS as REPLAY
+from crash_replay.replay_parameters import PARAMETERS as REPLAY
 from crash_replay.ros_messages import channel_to_msg, decoded, stamp, test_from_msg
 
 from ..cli.common import parse_settings
@@ -29,13 +29,14 @@ from ..core.methods import METHODS, make_estimator
 from ..following.alignment import Alignment
 from ..kept import Kept
 from ..model_file import load_model
-from ..nodes.diagnosis_command import PARAMETERS as DIAGNOSIS
+from ..nodes.diagnosis_parameters import PARAMETERS as DIAGNOSIS
 from ..nodes.effect_requests import with_effect
-from ..nodes.estimator_command import PARAMETERS as ESTIMATOR
 from ..nodes.estimator_model import EstimatorModel
+from ..nodes.estimator_parameters import PARAMETERS as ESTIMATOR
+from ..nodes.estimator_parameters import settings_of
 from ..nodes.samples import received, rows_of, what_is_wrong
-from ..nodes.viewer_command import PARAMETERS as VIEWER
 from ..nodes.viewer_messages import BLOCK_OF, FINDING_OF, test_block
+from ..nodes.viewer_parameters import PARAMETERS as VIEWER
 from . import live
 from .bags import spoilt_bag
 from .mutations import FLOATS, INTEGERS, NUMBERS, PYTHON, WORDS, spoilt, spoilt_message
@@ -130,7 +131,8 @@ def _take_output(folder: Path) -> None:
         make("mrls", message)
 
 
-NODES = {"estimator": ESTIMATOR, "diagnosis": DIAGNOSIS, "viewer": VIEWER, "replay": REPLAY}
+SETTING = {name: one for method in METHODS for name, one in settings_of(method).items()}
+NODES = {"estimator": ESTIMATOR | SETTING, "diagnosis": DIAGNOSIS, "viewer": VIEWER, "replay": REPLAY}
 SETTINGS = sorted({f.name for recipe in METHODS.values() for f in fields(recipe.kind)} | {"damping_after", "no_such"})
 
 
@@ -163,7 +165,7 @@ def _take_model(folder: Path) -> None:
     """As a node does, which tries it on a sample."""
     structure = load_model(folder / "model.yaml", EFFECTS)
     method = list(METHODS)[len(structure.name) % len(METHODS)]
-    EstimatorModel(str(folder / "model.yaml"), method, [""], "", False)
+    EstimatorModel(structure, method, {}, EFFECTS).try_out()
 
 
 def _take_effect(folder: Path) -> None:

@@ -5,10 +5,11 @@ from collections.abc import Callable
 
 from crash_msgs.msg import Samples
 from crash_msgs.srv import GetSamples
+from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.task import Future
 
-from crash_replay.attending import Attending
+from crash_replay.attending import REPLAY, Attending
 from crash_replay.recording import RecordingError
 
 from ..kept import Rows
@@ -25,20 +26,33 @@ class Asking:
     def __init__(
         self,
         node: Node,
-        service: str,
+        replay: str,
         attending: Attending,
         done: Callable[[Rows | None], None],
         fitting: Callable[[Samples], Rows],
     ):
-        """done: called with the samples, or with None where there are none to be had, and `why_not` says why;
-        fitting: what makes them of an answer, and raises RecordingError where they cannot be of the test."""
+        """replay: the node's name, "" for that of the replay that takes part; done: called with the samples, or with
+        None where there are none to be had, and `why_not` says why; fitting: what makes them of an answer, and raises
+        RecordingError where they cannot be of the test."""
         self.node, self.attending, self.done, self.fitting = node, attending, done, fitting
         self.why_not = ""
-        self.client = node.create_client(GetSamples, service)
+        self.replay = replay
+        self.clients: dict[str, Client] = {}  # by the name of the replay
+        self.asked_of = self.client  # made in advance: its service takes a moment to be found
         self.wanted: GetSamples.Request | None = None
         self.call: Future | None = None  # None: nothing is wanted, or the service not found yet
         self.test_came = self.began = self.asked = 0.0  # monotonic s: when the test came, when it was asked first, last
         node.create_timer(0.05, self._look)
+
+    @property
+    def client(self) -> Client:
+        """Of the replay that there is now."""
+        others = self.attending.others
+        there = [name for name in others.names(REPLAY) if others.there(name)]
+        name = self.replay or (there[0] if there else REPLAY)
+        if name not in self.clients:
+            self.clients[name] = self.node.create_client(GetSamples, f"{name}/get_samples")
+        return self.clients[name]
 
     @property
     def busy(self) -> bool:
@@ -47,6 +61,7 @@ class Asking:
     def begin_test(self) -> None:
         """What was asked is no longer wanted."""
         self._forget()
+        self.asked_of = self.client
         self.test_came = time.monotonic()
 
     def ask(self, start: int, stop: int) -> bool:
@@ -74,13 +89,13 @@ class Asking:
 
     def _call_if_found(self) -> None:
         if self.client.service_is_ready():
-            self.asked = time.monotonic()
-            self.call = self.client.call_async(self.wanted)
+            self.asked, self.asked_of = time.monotonic(), self.client
+            self.call = self.asked_of.call_async(self.wanted)
             self.call.add_done_callback(self._answered)
 
     def _forget(self) -> None:
         if self.call:
-            self.client.remove_pending_request(self.call)
+            self.asked_of.remove_pending_request(self.call)
         self.call = self.wanted = None
 
     def _answered(self, call: Future) -> None:
@@ -115,6 +130,6 @@ class Asking:
         elif not self.call:
             self._call_if_found()
         elif time.monotonic() - self.asked > PATIENCE:  # the call or its answer was lost with who was stopped
-            self.client.remove_pending_request(self.call)
+            self.asked_of.remove_pending_request(self.call)
             self.call = None
             self._call_if_found()

@@ -16,7 +16,7 @@ from crash_replay.fault import of_the_program
 from crash_replay.recording import Channel, Recording, RecordingError, Test
 
 from ..core.compile_cache import compiling_said
-from ..core.diagnosis import OnlineAnswer, OnlineDiagnosis, OnlineState, diagnose, final_answer
+from ..core.diagnosis import DEFAULT, OnlineAnswer, OnlineDiagnosis, OnlineState, diagnose, final_answer
 from ..core.effects import EFFECTS
 from ..core.effects.effect import Effect
 from ..core.effects.user import load_effects
@@ -44,7 +44,8 @@ class Answerer:
         """None where the samples are too few. Raises ModelError or RecordingError."""
         structure, recording = task.structure, task.recording
         if task.final:
-            return final_answer(diagnose(structure, [recording, *self.others], self.effects))
+            others, tolerance = self.others, task.tolerance or DEFAULT
+            return final_answer(diagnose(structure, [recording, *others], self.effects, tolerance, task.seconds))
         live = self.live
         if live is None or live.structure != structure or live.test != recording.test or len(recording) < self.samples:
             live = OnlineDiagnosis(structure, recording.test, self.others, self.effects)

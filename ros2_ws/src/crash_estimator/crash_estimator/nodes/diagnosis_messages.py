@@ -30,7 +30,7 @@ class Moment(NamedTuple):
 def ranking_message(at: Moment, answer: "OnlineAnswer") -> Ranking:
     before, after = answer.white
     return Ranking(
-        header=Header(stamp=at.stamp),
+        header=Header(stamp=at.stamp, frame_id=at.structure.name),
         run=at.run,
         number=at.number,
         time=at.time_ns * 1e-9,
@@ -60,7 +60,9 @@ def ranking_message(at: Moment, answer: "OnlineAnswer") -> Ranking:
 
 def misfit_message(at: Moment, answer: "OnlineAnswer") -> Misfit:
     windows = [MisfitWindow(start=w.start, end=w.end, body=w.body, state=w.state, rms=w.rms) for w in answer.misfit]
-    return Misfit(header=Header(stamp=at.stamp), run=at.run, number=at.number, model=at.structure.name, windows=windows)
+    model = at.structure.name
+    header = Header(stamp=at.stamp, frame_id=model)
+    return Misfit(header=header, run=at.run, number=at.number, model=model, windows=windows)
 
 
 def revision_message(at: Moment, model: str, number: int, stamp: Time, fit: "FitCurves", rows: slice) -> Revision:
@@ -73,7 +75,7 @@ def revision_message(at: Moment, model: str, number: int, stamp: Time, fit: "Fit
         "noise_std": np.broadcast_to(fit.noise, measured.shape),
     }
     return Revision(
-        header=Header(stamp=stamp),
+        header=Header(stamp=stamp, frame_id=model),
         run=at.run,
         number=number,
         time_ns=array("q", fit.time_ns[rows].tobytes()),

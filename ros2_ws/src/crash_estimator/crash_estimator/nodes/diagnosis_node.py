@@ -2,7 +2,7 @@
 
 import sys
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from crash_msgs.msg import Ranking, Samples, TestInfo
 from rclpy.node import Node
@@ -13,7 +13,7 @@ from crash_replay.bag import read_bag
 from crash_replay.complaints import Complaints
 from crash_replay.health import HealthReport
 from crash_replay.limits import most_samples
-from crash_replay.node_parameters import declare_parameters, names_in
+from crash_replay.node_parameters import declare_parameters, follow_changes, names_in
 from crash_replay.qos import EVERY_SAMPLE, LATCHED
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import stamp, stamp_ns, test_from_msg
@@ -28,9 +28,9 @@ from ..model_file import load_model
 from .asking import Asking
 from .catching_up import CatchingUp
 from .channel_feed import ChannelFeed
-from .diagnosis_command import PARAMETERS
 from .diagnosis_health import diagnosis_health
 from .diagnosis_messages import Moment
+from .diagnosis_parameters import PARAMETERS, Wanted
 from .diagnosis_telling import Telling
 from .diagnosis_worker import Task, Worker, WorkerError
 from .hearing import hear
@@ -53,7 +53,7 @@ class DiagnosisNode(Node):
         super().__init__("diagnosis", automatically_declare_parameters_from_overrides=True, **options)
         asked = declare_parameters(self, PARAMETERS)
         model, effects, replay = asked["model"], asked["effects"], asked["replay"]
-        self.adds, self.every_ns = asked["add_first"], round(asked["every"] * 1e9)
+        self.values, self.wanted, self.adds = asked, Wanted.from_values(asked), asked["add_first"]
         self.effects = EFFECTS | (load_effects(effects) if effects else {})
         structure = load_model(model, self.effects)
         self.bags = names_in(asked["with_bags"])
@@ -77,13 +77,14 @@ class DiagnosisNode(Node):
         others = names_in(asked["estimators"])
         self.model = ModelRevisions(self, structure, self.effects, others, test, self._on_other_model)
         self.attending = Attending(self, "diagnosis", self._progress)
-        self.asking = Asking(self, f"{replay}/get_samples", self.attending, self._on_samples_again, self._fitting)
+        self.asking = Asking(self, replay, self.attending, self._on_samples_again, self._fitting)
         self.catching_up = CatchingUp(self, self.attending, self._place, self._ask_for_rest)
         self.feed = ChannelFeed(self, "samples", self._on_feed_begins, self._on_feed)
         HealthReport(self, "answers", partial(diagnosis_health, self))
         hear(self, self.complaints, TestInfo, "test", self._on_test, LATCHED)
         hear(self, self.complaints, Samples, "samples", self._on_samples, EVERY_SAMPLE, received)
         self.create_timer(LOOK, self._look)
+        follow_changes(self, PARAMETERS, self._on_parameters)
         self.attending.tell()
 
     @property
@@ -186,7 +187,7 @@ class DiagnosisNode(Node):
         missing = self.kept.missing(self.end)
         final = self.asked is not None and self.asked.final and not self.worker.busy
         why = self.stopped or (self.cannot_be_had if missing or self.end < self.total else "")
-        done = final or bool(self.stopped)
+        done = (final or bool(self.stopped)) and self.model.complete
         return Progress(self.run if self.run >= 0 else 0, self.total, self.end, missing, done, why, self.prepared)
 
     # what is asked and said
@@ -212,8 +213,8 @@ class DiagnosisNode(Node):
 
     def _ask(self) -> None:
         time_ns = int(self.kept.time_ns[self.end - 1])
-        asked, complete = self.asked, self.end == self.total
-        new = asked is None or time_ns - asked.time_ns >= self.every_ns or (complete and asked.number < self.end - 1)
+        asked, complete, every = self.asked, self.end == self.total, self.wanted.every_ns
+        new = asked is None or time_ns - asked.time_ns >= every or (complete and asked.number < self.end - 1)
         if not (new or (complete and not asked.final)) or not self._has_enough():
             return
         at = stamp(self.time_zero + time_ns)
@@ -222,7 +223,8 @@ class DiagnosisNode(Node):
         if known:
             self._conclude(self.asked, known)
         else:
-            self.worker.ask(Task(self.structure, self.kept.until(self.end), self.asked.final))
+            recording, wanted = self.kept.until(self.end), self.wanted
+            self.worker.ask(Task(self.structure, recording, self.asked.final, wanted.tolerance, wanted.seconds))
 
     def _has_enough(self) -> bool:
         """Whether next to no sample is missing; asks for those that are."""
@@ -252,6 +254,14 @@ class DiagnosisNode(Node):
         if self.adds and answer.found and answer.verdict != Ranking.UNEXPLAINED:
             self.adds = False
             self.model.add(answer.found[0])
+
+    def _on_parameters(self, new: dict[str, Any]) -> None:
+        """What may be left, or the time there is for it, is another: the question is asked once more."""
+        before, values = self.wanted, self.values | new
+        self.wanted, self.values = Wanted.from_values(values), values
+        if self.wanted._replace(every_ns=before.every_ns) != before:
+            self.finals.clear()
+            self._begin_anew()
 
     def _on_other_model(self) -> str:
         self._begin_anew()

@@ -3,6 +3,7 @@
 `diagnosis_answerer` is that process: what it computes with is not imported on this side.
 """
 
+import math
 import signal
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from crash_replay.starting import held
 from ..core.structure import Structure
 
 if TYPE_CHECKING:
-    from ..core.diagnosis import OnlineAnswer
+    from ..core.diagnosis import OnlineAnswer, Tolerance
 
 ANSWERER = "crash_estimator.nodes.diagnosis_answerer"
 
@@ -27,6 +28,8 @@ class Task(NamedTuple):
     structure: Structure
     recording: Recording  # as far as the samples go
     final: bool  # that was the last one: the offline answer
+    tolerance: "Tolerance | None" = None  # of the final answer: what is good enough, where somebody has said it
+    seconds: float = math.inf  # of the final answer: after which nothing more is tried
 
 
 class Reply(NamedTuple):

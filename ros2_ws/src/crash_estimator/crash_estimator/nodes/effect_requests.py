@@ -1,7 +1,9 @@
 """Requests to add an effect: how an effect's constants travel as text."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
+from crash_msgs.msg import ModelEffect
 from crash_msgs.srv import AddEffect
 
 from crash_replay.recording import Test
@@ -21,6 +23,21 @@ def request_of(spec: EffectSpec) -> AddEffect.Request:
     options = [f"{name}={float(value)!r}" for name, value in (numbers | dict(spec.shape)).items()]
     options += [f"{name}={value}" for name in WORDS if (value := getattr(spec, name))]
     return AddEffect.Request(effect=spec.type, target=spec.target, options=options)
+
+
+def model_effect(spec: EffectSpec) -> ModelEffect:
+    """The same, as an estimator tells of it."""
+    request = request_of(spec)
+    return ModelEffect(effect=request.effect, target=request.target, options=request.options)
+
+
+def with_effects(structure: Structure, said: Sequence[ModelEffect], test: Test | None = None) -> Structure:
+    """The structure with just the effects that an estimator has told of; raises ModelError with one line."""
+    structure = replace(structure, effects=())
+    for one in said:
+        request = AddEffect.Request(effect=one.effect, target=one.target, options=list(one.options))
+        structure = with_effect(structure, request, test=test)
+    return structure
 
 
 def with_effect(

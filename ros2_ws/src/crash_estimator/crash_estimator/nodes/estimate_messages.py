@@ -31,7 +31,8 @@ class EstimateMessages:
             Forces(element=list(d.elements), between=ends, body=list(d.bodies), mass=array("d", d.masses)),
         )
         for message in empty:
-            message.model, message.method, message.revision = d.model, d.method, revision
+            message.header.frame_id = message.model = d.model
+            message.method, message.revision = d.method, revision
         self.description = description
         self._parameters, self._residuals, self._forces = (
             lru_cache(SIZES)(partial(Tables, message)) for message in empty
@@ -53,6 +54,7 @@ class EstimateMessages:
             time_ns = int(columns.time_ns[row])
             message = Event(run=run, number=columns.number + row, time=time_ns * 1e-9, **event._asdict())
             message.header.stamp = stamp(stamp_ns + time_ns - int(columns.time_ns[0]))
+            message.header.frame_id = self.description.model
             messages.append(message)
         return messages
 

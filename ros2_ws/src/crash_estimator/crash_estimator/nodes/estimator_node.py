@@ -4,6 +4,7 @@ what."""
 import sys
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 from crash_msgs.msg import Samples, TestInfo
 from crash_msgs.srv import AddEffect, RemoveEffect
@@ -14,7 +15,7 @@ from crash_replay.attending import Attending, Progress
 from crash_replay.complaints import Complaints
 from crash_replay.health import HealthReport
 from crash_replay.limits import most_samples
-from crash_replay.node_parameters import declare_parameters, names_in
+from crash_replay.node_parameters import declare_parameters, follow_changes, given_to, names_in
 from crash_replay.qos import EVERY_SAMPLE, LATCHED, UNLATCHED
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import stamp_ns, test_from_msg
@@ -22,7 +23,7 @@ from crash_replay.ros_runtime import run
 
 from ..core.compile_cache import compiling_said
 from ..core.effects.change import remove_effect
-from ..core.structure import ModelError, Structure
+from ..core.structure import ModelError
 from ..following.again import estimated_again
 from ..following.arrivals import Waiting, missing_text
 from ..following.columns import Columns, FilterFailure
@@ -31,9 +32,9 @@ from ..kept import Kept, Rows
 from .channel_feed import ChannelFeed
 from .effect_requests import with_effect
 from .estimates_again import EstimatesAgain
-from .estimator_command import PARAMETERS
 from .estimator_health import estimator_health
-from .estimator_model import EstimatorModel
+from .estimator_model import EstimatorModel, model_asked
+from .estimator_parameters import table_for
 from .estimator_topics import EstimatorTopics
 from .hearing import hear
 from .intake import Intake
@@ -44,10 +45,9 @@ class EstimatorNode(Node):
     def __init__(self, **options) -> None:
         """options: of rclpy's Node, such as parameter_overrides. Raises ModelError or ParameterError with one line."""
         super().__init__("estimator", automatically_declare_parameters_from_overrides=True, **options)
-        asked = declare_parameters(self, PARAMETERS)
-        replay, value_topics = asked.pop("replay"), names_in(asked.pop("value_topics"))
+        asked = declare_parameters(self, table := table_for(given_to(self)))
         with compiling_said(self.get_logger().info):
-            self.model = EstimatorModel(**asked)
+            self.model = model_asked(asked)
         self.test_message: TestInfo | None = None
         self.unlatched: TestInfo | None = None  # come by itself, and to come once more if its publisher latches
         self.follower: Follower | None = None  # None: no test yet, or one that the model does not fit
@@ -56,14 +56,15 @@ class EstimatorNode(Node):
         self.at_fault = ""  # why nothing is estimated on this test
         self.complaints = Complaints(lambda line: self.get_logger().error(line))
         self.warnings = Complaints(lambda line: self.get_logger().warning(line))
-        self.topics = EstimatorTopics(self, value_topics)
+        self.topics = EstimatorTopics(self, names_in(asked["value_topics"]))
         self.again = EstimatesAgain(self)
         self.attending = Attending(self, "estimator", self._progress)
-        self.intake = Intake(self, f"{replay}/get_samples", self.attending, self)
+        self.intake = Intake(self, asked["replay"], self.attending, self)
         HealthReport(self, "filter", partial(estimator_health, self))
         self.create_service(Trigger, "~/reset", self._on_reset)
         self.create_service(AddEffect, "~/add_effect", self._on_add_effect)
         self.create_service(RemoveEffect, "~/remove_effect", self._on_remove_effect)
+        follow_changes(self, table, self._on_settings)
         self.feed, self.feed_run = ChannelFeed(self, "samples", self._on_feed_begins, self._on_feed), -1
         hear(self, self.complaints, TestInfo, "test", self._on_test, LATCHED)
         hear(self, self.complaints, TestInfo, "test", self._on_unlatched_test, UNLATCHED)
@@ -88,7 +89,7 @@ class EstimatorNode(Node):
         self.intake.begin_test(listening=False)
         try:
             test = test_from_msg(message)
-            estimator = self.model.estimator(self.model.structure, test)
+            estimator = self.model.estimator(test)
         except (ModelError, RecordingError) as error:
             self.at_fault = " ".join(str(error).split())
             self.get_logger().error(f"{self.at_fault}; nothing is estimated on this test")
@@ -200,37 +201,50 @@ class EstimatorNode(Node):
 
     def _on_add_effect(self, request: AddEffect.Request, response: AddEffect.Response) -> AddEffect.Response:
         test, model = self.follower.kept.test if self.follower else None, self.model
-        return self._change(lambda: with_effect(model.structure, request, model.known_effects, test), response)
+        return self._answer(
+            lambda: model.with_structure(with_effect(model.structure, request, model.known_effects, test)), response
+        )
 
     def _on_remove_effect(
         self, request: RemoveEffect.Request, response: RemoveEffect.Response
     ) -> RemoveEffect.Response:
-        return self._change(lambda: remove_effect(self.model.structure, request.effect, request.target), response)
+        model = self.model
+        return self._answer(
+            lambda: model.with_structure(remove_effect(model.structure, request.effect, request.target)), response
+        )
 
-    def _change(self, change: Callable[[], Structure], response):
-        """Go on with another model, as if it had been this one from the first sample on."""
-        old, done = self.follower, ""
+    def _answer(self, change: Callable[[], EstimatorModel], response):
         try:
-            structure = change()
-            self.model.try_out(structure)
-            if old:
-                self.follower, done = estimated_again(old, self.model.estimator(structure, old.kept.test))
+            response.message = self._change(change())
+            response.success = True
         except (ModelError, RecordingError) as error:
             response.message = " ".join(str(error).split())
-            return response
+        return response
+
+    def _on_settings(self, values: dict[str, Any]) -> None:
+        self._change(self.model.with_settings(values))
+
+    def _change(self, model: EstimatorModel) -> str:
+        """Go on with another model, as if it had been this one from the first sample on; what is new, in a line.
+
+        Raises ModelError or RecordingError, and all stays as it is.
+        """
+        old, done = self.follower, ""
+        try:
+            model.try_out()
+            if old:
+                self.follower, done = estimated_again(old, model.estimator(old.kept.test))
         except FilterFailure as failure:
-            response.message = f"{failure}: model {self.model.structure.name} stays as it is"
-            return response
-        self.model.revise(structure)
-        self.stopped, self.latest = "", None
-        name = f"revision {self.model.revision}: {structure.name} with {', '.join(self.model.effects()) or 'no effect'}"
-        response.success, response.message = True, name + (f"; {done}" if done else "")
-        self.get_logger().info(response.message)
+            raise ModelError(f"{failure}: model {self.model.structure.name} stays as it is") from None
+        self.model, self.stopped, self.latest = model, "", None
+        effects = ", ".join(model.effects()) or "no effect"
+        text = f"revision {model.revision}: {model.structure.name} with {effects}" + (f"; {done}" if done else "")
+        self.get_logger().info(text)
         if old:
-            self._tell_of_change(response.message)
+            self._tell_of_change(text)
         elif self.test_message:  # which the model may now fit
             self._begin_test(self.test_message)
-        return response
+        return text
 
     def _tell_of_change(self, text: str) -> None:
         number, run, revision = self.follower.position, self.intake.arrivals.run, self.model.revision

@@ -11,12 +11,13 @@ from rclpy.node import Node
 
 from crash_replay.cdr import Serialized
 from crash_replay.flow import NOT_WAITING, Flow
-from crash_replay.qos import LATCHED, STREAM
+from crash_replay.qos import EVENTS, LATCHED, STREAM
 from crash_replay.ros_messages import stamp, stamp_ns
 from crash_replay.subscribers import waited_for
 
 from ..core.estimate import Description
 from ..following.columns import Columns
+from .effect_requests import model_effect
 from .estimate_messages import FIELDS, EstimateMessages
 from .estimator_model import EstimatorModel
 from .later import LOOK, Later
@@ -30,7 +31,7 @@ class EstimatorTopics:
         self.residuals = node.create_publisher(ResidualsBlock, "~/block/residuals", STREAM)
         self.named = NamedTopics(node, value_topics)
         self.forces = node.create_publisher(Forces, "~/forces", STREAM)
-        self.events = node.create_publisher(Event, "~/events", STREAM)
+        self.events = node.create_publisher(Event, "~/events", EVENTS)
         self.state = node.create_publisher(EstimatorState, "~/state", LATCHED)
         self.answers = node.create_publisher(Answer, "answers", LATCHED)  # a replay that finds it late gets the last
         self.answered = Serialized(Answer(node=node.get_fully_qualified_name()))
@@ -88,14 +89,15 @@ class EstimatorTopics:
     def event(self, kind: str, target: str, value: float, text: str, run: int, number: int, stamp_ns: int) -> None:
         time = (stamp_ns - self.time_zero) * 1e-9
         message = Event(run=run, number=number, time=time, kind=kind, target=target, value=value, text=text)
-        message.header.stamp = stamp(stamp_ns)
+        message.header.stamp, message.header.frame_id = stamp(stamp_ns), self.messages.description.model
         self.events.publish(message)
 
     def tell_state(self, model: EstimatorModel, run: int, number: int, stamp_ns: int, **counts: int) -> None:
         """counts: the other numbers of an EstimatorState, by their fields."""
         names = {"model": model.structure.name, "method": model.method, "effects": model.effects()}
+        names["model_effects"] = [model_effect(spec) for spec in model.structure.effects]
         message = EstimatorState(run=run, number=number, revision=model.revision, **names, **counts)
-        message.header.stamp = stamp(stamp_ns)
+        message.header.stamp, message.header.frame_id = stamp(stamp_ns), message.model
         self.state.publish(message)
 
     def answer(self, run: int, number: int, missed: int) -> None:

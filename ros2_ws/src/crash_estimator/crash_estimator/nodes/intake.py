@@ -28,15 +28,15 @@ class Consumer(Protocol):
 
 
 class Intake:
-    def __init__(self, node: Node, service: str, attending: Attending, consumer: Consumer):
-        """service: that gives samples again."""
+    def __init__(self, node: Node, replay: str, attending: Attending, consumer: Consumer):
+        """replay: as of Asking."""
         self.log, self.attending, self.consumer = node.get_logger(), attending, consumer
         self.arrivals, self.waiting = Arrivals(), deque[Waiting]()
         self.asked_again = 0  # samples
         self.listening = False  # to a test
         self.rest_of = 0  # the pass that more is asked of while nothing waits
         self.refused: Place | None = None  # nothing more can be had from here on
-        self.asking = Asking(node, service, attending, self._on_asked, consumer.fitting)
+        self.asking = Asking(node, replay, attending, self._on_asked, consumer.fitting)
         self.catching_up = CatchingUp(node, attending, self._place, self._ask_for_rest)
 
     def begin_test(self, listening: bool) -> None:

@@ -23,6 +23,7 @@ class ModelRevisions:
         self.node, self.structure, self.number = node, structure, 0
         self.effects, self.test, self.changed = effects, test, changed
         self.also_add = {name: node.create_client(AddEffect, f"{name}/add_effect") for name in estimators}
+        self.adding: set[str] = set()  # estimators that have not answered yet
         node.create_service(AddEffect, "~/add_effect", self._on_add_effect)
         node.create_service(RemoveEffect, "~/remove_effect", self._on_remove_effect)
 
@@ -37,9 +38,16 @@ class ModelRevisions:
             if not client.service_is_ready():
                 self.node.get_logger().warning(f"there is no service {client.srv_name}: is there an estimator {name}?")
                 continue
+            self.adding.add(name)
             client.call_async(request).add_done_callback(lambda call, name=name: self._say(name, call.result()))
 
+    @property
+    def complete(self) -> bool:
+        """Whether what was found is in all estimators' models: who waits for the last word waits for that, too."""
+        return not any(self.also_add[name].service_is_ready() for name in self.adding)
+
     def _say(self, name: str, response: AddEffect.Response) -> None:
+        self.adding.discard(name)
         log = self.node.get_logger()
         (log.info if response.success else log.warning)(f"{name}: {response.message}")
 

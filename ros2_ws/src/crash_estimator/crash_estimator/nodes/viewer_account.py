@@ -11,18 +11,28 @@ from crash_replay.attending import Attending
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import decoded
 
+from .revised_estimates import RevisedEstimates
 from .whole_estimates import QUIET, STAYS, WholeEstimates
 
 DIAGNOSIS = "diagnosis"
 """The role, and the name, of the node whose findings are drawn."""
+ON_ITS_WAY = 0.5
+"""s: what one node has said before another answers it comes that little after the answer at most."""
 
 
 class Account:
-    def __init__(self, attending: Attending, estimates: Mapping[str, WholeEstimates]):
-        self.attending, self.estimates = attending, estimates
+    def __init__(
+        self,
+        attending: Attending,
+        estimates: Mapping[str, WholeEstimates],
+        revised: Mapping[str, RevisedEstimates] = {},
+    ):
+        """estimates, revised: by estimator."""
+        self.attending, self.estimates, self.revised = attending, estimates, revised
         self.total = 0
         self.finals: set[int] = set()  # passes that the diagnosis has given a final answer on
         self.found_at = time.monotonic()  # when it has said something for the last time
+        self.at_work = 0.0  # when it was not done yet, as far as was seen
 
     def begin_test(self, total: int) -> None:
         self.total = total
@@ -48,6 +58,7 @@ class Account:
         return (
             bool(self.total)
             and all(one.reached(run, sent) or (over and one.waits_for_nothing()) for one in self.estimates.values())
+            and all(one.settled for one in self.revised.values())
             and all(self._is_through(name, run) for name in self.attending.others.names(DIAGNOSIS))
         )
 
@@ -61,6 +72,7 @@ class Account:
         """A text on each that is not drawn as a whole."""
         run, first, sent = self._pass()
         lines = [f"{name} {lacks}" for name, one in self.estimates.items() if (lacks := one.lacks(run, first, sent))]
+        lines += [f"{name} {one.why_not}" for name, one in self.revised.items() if one.why_not]
         if not self.estimates:
             lines.append("no estimator was heard")
         for name in self.attending.others.names(DIAGNOSIS):
@@ -79,7 +91,11 @@ class Account:
         return state.run, state.first, state.number if state.state == ReplayState.FINISHED else self.total
 
     def _is_through(self, name: str, run: int) -> bool:
-        others, quiet = self.attending.others, time.monotonic() - self.found_at > QUIET
+        others, now = self.attending.others, time.monotonic()
         word, state = others.word(name), others.state(name)
         said_all = word.done and (word.run == run or bool(word.reason))
+        if not said_all:
+            self.at_work = now
+        # a little after its last word: what it has added to the estimators is on its way from them
+        quiet = now - self.found_at > QUIET and now - self.at_work > ON_ITS_WAY * said_all
         return quiet and (said_all or state in GONE or others.silence(name) > STAYS)

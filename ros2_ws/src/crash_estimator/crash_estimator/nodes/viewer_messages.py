@@ -16,7 +16,7 @@ from crash_msgs.msg import (
 from crash_replay.foreign_text import visible
 from crash_replay.recording import RecordingError
 
-from ..viewer.blocks import EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock
+from ..viewer.blocks import EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock, speaker
 from ..viewer.findings import Candidate, MisfitBlock, RankingBlock, RevisionBlock, Window
 
 
@@ -127,7 +127,7 @@ FINDING_OF = {
 
 def _head(estimator: str, message: ParametersBlock | ResidualsBlock | Forces) -> tuple:
     time_ns = np.asarray(message.time_ns, dtype=np.int64)
-    return estimator, message.run, message.number, time_ns, message.model, message.method
+    return speaker(estimator, message.revision), message.run, message.number, time_ns, message.model, message.method
 
 
 def _tables(

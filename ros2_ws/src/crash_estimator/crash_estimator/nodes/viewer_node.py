@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Hashable, Sequence
+from contextlib import suppress
 from functools import cache, partial
 
 from crash_msgs.msg import Event, Samples, TestInfo
@@ -16,24 +17,30 @@ from crash_replay.attending import Attending, Progress
 from crash_replay.complaints import Complaints
 from crash_replay.foreign_text import visible
 from crash_replay.health import HealthReport
+from crash_replay.namespaces import is_own
 from crash_replay.node_parameters import declare_parameters, names_in
 from crash_replay.output import check_outputs
 from crash_replay.qos import LATCHED, SAID, STREAM, UNACKNOWLEDGED
+from crash_replay.recording import Test
 from crash_replay.ros_messages import decoded, test_from_msg
 from crash_replay.ros_runtime import run
 from crash_replay.said import say
 
-from ..core.structure import Structure
+from ..core.effects.applied import applied
+from ..core.structure import ModelError, Structure
 from ..model_file import load_model
 from ..ready_models import ready_models
 from ..viewer.native import has_display, open_viewer
 from ..viewer.recorder import Recorder
 from ..viewer.sinks import Sinks
+from ..viewer.web import WebViewer
+from .effect_requests import with_effects
 from .hearing import hear
+from .revised_estimates import RevisedEstimates
 from .viewer_account import Account
-from .viewer_command import PARAMETERS
 from .viewer_health import viewer_health
 from .viewer_messages import BLOCK_OF, FINDING_OF, test_block
+from .viewer_parameters import PARAMETERS
 from .whole_estimates import WholeEstimates
 
 SETTLED = 0.3
@@ -55,9 +62,10 @@ class ViewerNode(Node):
         port, wants_window, models = asked["port"], asked["open"], names_in(asked["models"])
         check_outputs({"parameter rrd:": asked["rrd"] or None}, models)
         sinks = Sinks(port, asked["rrd"], asked["memory_limit"])
-        known = cache(partial(structure_named, models))
+        self.structure_named = cache(partial(structure_named, models))
+        self.test: Test | None = None
         warn = self.get_logger().warning
-        self.recorder = Recorder(sinks, tuple(self.names), say=warn, structure_of=known)
+        self.recorder = Recorder(sinks, tuple(self.names), say=warn, structure_of=self._structure_of)
         if port not in (0, sinks.port):  # 0 asks for any
             log(f"port {port} is in use, taking {sinks.port}")
         self.window: subprocess.Popen | None = None
@@ -67,6 +75,9 @@ class ViewerNode(Node):
             log(f"viewer opened on {sinks.url}")
         else:
             log(self.invitation)
+        self.web = WebViewer(sinks.url, asked["web_port"]) if asked["web"] and not has_display() else None
+        if self.web:
+            log(f"or in a browser on this machine: {self.web.page}")
         if sinks.rrd:
             log(f"writing {visible(sinks.rrd)}")
         self.done = Future()
@@ -75,9 +86,10 @@ class ViewerNode(Node):
         self.replay_goes_on = False
         self.said_finished = False
         self.estimates: dict[str, WholeEstimates] = {}  # by estimator
+        self.revised: dict[str, RevisedEstimates] = {}
         self.heard_since = time.monotonic()
         self.attending = Attending(self, "viewer", self._progress)
-        self.account = Account(self.attending, self.estimates)
+        self.account = Account(self.attending, self.estimates, self.revised)
         complaints = Complaints(lambda line: self.get_logger().warning(line))
         hear(self, complaints, TestInfo, "test", self._on_test, LATCHED)
         for topic, (kind, make) in FINDING_OF.items():
@@ -94,7 +106,9 @@ class ViewerNode(Node):
             kind, make = BLOCK_OF[topic]
             self._queue(kind, partial(make, name), None if topic == "events" else (name, topic), raw)
 
-        self.estimates[name] = WholeEstimates(self, name, self.attending, queue)
+        self.revised[name] = RevisedEstimates(self, name, queue)
+        self.estimates[name] = WholeEstimates(self, name, self.attending, self.revised[name].take)
+        self.revised[name].follow(self.estimates[name])
         self.create_subscription(Event, f"{name}/events", partial(queue, "events"), STREAM, raw=True)
 
     def _queue(self, kind: type, make: Callable, stream: Hashable, raw: bytes) -> None:
@@ -105,12 +119,25 @@ class ViewerNode(Node):
         self._queue(kind, make, None, raw)
 
     def _on_test(self, message: TestInfo) -> None:
-        test_from_msg(message)  # raises where it cannot be a test
+        test = test_from_msg(message)  # raises where it cannot be a test
         self.total = message.samples
         self.account.begin_test(message.samples)
-        for estimates in self.estimates.values():
+        for estimates in (*self.estimates.values(), *self.revised.values()):
             estimates.begin_test()
+        self.test = test
         self.recorder.put(partial(test_block, message))
+
+    def _structure_of(self, estimator: str, revision: int, model: str) -> Structure | None:
+        """The model that an estimator has spoken from, its effects at work; None where it is not known."""
+        structure = self.structure_named(model)
+        if structure is None or self.test is None:
+            return None
+        said = self.estimates[estimator].states if revision else ()
+        effects = [state.model_effects for state in said if state.revision == revision]
+        with suppress(ModelError):  # an effect of a user's own file
+            structure = with_effects(structure, effects[-1], self.test) if effects else structure
+            return applied(structure, self.test)
+        return None
 
     def _progress(self) -> Progress:
         """What there is to say on `attendance`: it needs no samples, so that no replay waits for it to get them."""
@@ -146,8 +173,8 @@ class ViewerNode(Node):
     def _estimators_around(self) -> set[str]:
         own = self.get_namespace().rstrip("/") + "/"
         kind, last = "crash_msgs/msg/ResidualsBlock", "/block/residuals"
-        topics = [topic for topic, kinds in self.get_topic_names_and_types() if kind in kinds]
-        return {topic.removeprefix(own).removesuffix(last) for topic in topics if topic.endswith(last)}
+        topics = [topic for topic, kinds in self.get_topic_names_and_types() if kind in kinds and topic.endswith(last)]
+        return {topic.removeprefix(own).removesuffix(last) for topic in topics if is_own(self, topic)}
 
     def _be_counted(self) -> None:
         """Subscribe to `samples` once all estimators can be heard, until the first sample.
@@ -192,6 +219,8 @@ def close(node: ViewerNode) -> str:
     for line in node.recorder.close(PATIENT if whole else HURRIED, "; ".join(lacking)):
         say(line)
     node.attending.leave()
+    if node.web:
+        node.web.close()
     lacking += node.recorder.faults
     return f"incomplete: {'; '.join(lacking)}" if lacking else ""
 

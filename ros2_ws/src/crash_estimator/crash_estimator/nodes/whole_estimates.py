@@ -208,7 +208,7 @@ class WholeEstimates:
             self.call = None
 
 
-HEADER, RUN, REST = struct.Struct("<iII"), struct.Struct("<I"), struct.Struct("<QI")
+HEADER, WORD, REST = struct.Struct("<iII"), struct.Struct("<I"), struct.Struct("<QI")
 
 
 def about_of(raw: bytes, kind: type) -> About:
@@ -216,8 +216,26 @@ def about_of(raw: bytes, kind: type) -> About:
     if raw[: len(PLAIN)] != PLAIN:  # from a machine of the other byte order
         message = deserialize_message(raw, kind)
         return About(message.run, message.number, len(message.time_ns))
+    return _head(raw)[0]
+
+
+def revision_of(raw: bytes, kind: type) -> int:
+    """Of the model that says it: after the times come the model's name, the method's, and this."""
+    if raw[: len(PLAIN)] != PLAIN:
+        return deserialize_message(raw, kind).revision
+    about, at = _head(raw)
+    at += about.count * 8 + (aligned(at, 8) - at if about.count else 0)
+    for _ in ("model", "method"):
+        at = aligned(at, 4)
+        at += WORD.size + WORD.unpack_from(raw, at)[0]
+    return WORD.unpack_from(raw, aligned(at, 4))[0]
+
+
+def _head(raw: bytes) -> tuple[About, int]:
+    """And where it ends."""
     at = len(PLAIN)
     text = HEADER.unpack_from(raw, at)[2]
     at = aligned(at + HEADER.size + text, 4)
-    (run,) = RUN.unpack_from(raw, at)
-    return About(run, *REST.unpack_from(raw, aligned(at + RUN.size, 8)))
+    (run,) = WORD.unpack_from(raw, at)
+    at = aligned(at + WORD.size, 8)
+    return About(run, *REST.unpack_from(raw, at)), at + REST.size

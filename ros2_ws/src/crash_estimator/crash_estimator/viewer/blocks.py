@@ -1,6 +1,7 @@
 """What the viewer is given: blocks of an estimator's output as arrays. Neither ROS nor Rerun here.
 
-A block holds n consecutive samples; its fields in `over_time` have n rows. SI units, as in crash_msgs.
+A block holds n consecutive samples; its `estimator` says who speaks, which is each revision of a model for itself; its
+fields in `over_time` have n rows. SI units, as in crash_msgs.
 """
 
 from collections.abc import Iterable
@@ -19,6 +20,23 @@ class TestBlock(NamedTuple):
     sample_period: float  # s
 
     __test__ = False  # not a pytest class
+
+
+REVISION = " revision "
+"""Between an estimator's name, which has no spaces, and the number of its model's revision."""
+
+
+def speaker(estimator: str, revision: int) -> str:
+    """Who says it: "kalman" with the model as it was given, "kalman revision 1" with the first change."""
+    return f"{estimator}{REVISION}{revision}" if revision else estimator
+
+
+def estimator_of(who: str) -> str:
+    return who.partition(REVISION)[0]
+
+
+def revision_of(who: str) -> int:
+    return int(who.partition(REVISION)[2] or 0)
 
 
 UNKNOWN_TEST = TestBlock("test", "", "", 0, 0.0)

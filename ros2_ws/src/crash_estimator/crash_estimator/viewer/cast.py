@@ -1,7 +1,8 @@
 """Who is on stage: the test, and what each estimator calls its parameters, equations, elements and bodies.
 
 The layout and every drawing follow from the cast alone, so that several models and methods come side by
-side: what has the same name shares a plot, and each estimator keeps its colour everywhere.
+side: what has the same name shares a plot, and each estimator keeps its colour everywhere. When its model is changed,
+the newest revision has that colour and stands in front; those before it fade.
 """
 
 from collections.abc import Callable
@@ -11,27 +12,18 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.estimate import ParameterStatus
-from .blocks import ForceBlock, ParameterBlock, ResidualBlock, TestBlock
+from .blocks import ForceBlock, ParameterBlock, ResidualBlock, TestBlock, estimator_of, revision_of
+from .colors import ESTIMATOR_COLORS, Color, faded
 from .units import Shown, shown
 
-Color = tuple[int, int, int]
-
-MEASURED: Color = (205, 205, 205)
-ESTIMATOR_COLORS: tuple[Color, ...] = (
-    (255, 140, 40),  # orange
-    (70, 165, 255),  # blue
-    (90, 210, 110),  # green
-    (235, 110, 205),  # pink
-    (245, 220, 70),  # yellow
-    (165, 135, 255),  # violet
-)
+Range = tuple[float, float]
 
 LIGHT = 10.0
 """kg: where no body is heavier, a kN is far too much."""
 
 
 class Member(NamedTuple):
-    """One estimator's names."""
+    """The names of one estimator, or of one revision of its model."""
 
     name: str
     model: str
@@ -82,14 +74,21 @@ class Cast:
     members: tuple[Member, ...] = ()
     rankings: tuple[int, ...] = ()  # revisions of the model that a ranking of missing effects has come of
     outputs: tuple[tuple[str, str], ...] = ()  # (name, unit) of what the diagnosis compares
-    judged: tuple[str, ...] = ()  # estimators whose whole pass the validation has judged
+    judged: tuple[str, ...] = ()  # members whose whole pass the validation has judged
     revisions_whole: bool = False  # every revision has its curve over the whole record
+    whole: bool = False  # some member has been drawn to the last sample
+    ranges: tuple[tuple[str, Range], ...] = ()  # of the vertical axes, by what a plot shows; others follow their data
+    reach: tuple[float, float] = (0.0, 0.0)  # what the moving masses take to the left and right of their places
 
     def with_member(self, new: Member) -> "Cast":
-        """The same with one more member, or with one replaced: an estimator that was started again."""
-        if new.name in self.names:
-            return replace(self, members=tuple(new if m.name == new.name else m for m in self.members))
-        return replace(self, members=self.members + (new,))
+        """The same with one more member, or with one replaced: an estimator that was started again.
+
+        Revisions of one model stand together, the newest first.
+        """
+        members = {m.name: m for m in self.members} | {new.name: new}
+        order = list(dict.fromkeys(map(estimator_of, members)))
+        place = {name: (order.index(estimator_of(name)), -revision_of(name)) for name in members}
+        return replace(self, members=tuple(members[name] for name in sorted(members, key=place.__getitem__)))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -98,13 +97,33 @@ class Cast:
     def member(self, name: str) -> Member:
         return self.members[self.names.index(name)]
 
+    @property
+    def newest(self) -> tuple[Member, ...]:
+        """Of each estimator the newest revision."""
+        return tuple(m for m in self.members if self.is_newest(m.name))
+
+    def before(self, name: str) -> str | None:
+        """The revision that a member has taken the place of."""
+        older = [m for m in self.names if estimator_of(m) == estimator_of(name) and revision_of(m) < revision_of(name)]
+        return max(older, key=revision_of, default=None)
+
+    @property
+    def estimators(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(map(estimator_of, self.names)))
+
+    def is_newest(self, name: str) -> bool:
+        """Whether no member is a later revision of the same model."""
+        return all(revision_of(m) <= revision_of(name) for m in self.names if estimator_of(m) == estimator_of(name))
+
     def color(self, name: str) -> Color:
-        return ESTIMATOR_COLORS[self.names.index(name) % len(ESTIMATOR_COLORS)]
+        own = ESTIMATOR_COLORS[self.estimators.index(estimator_of(name)) % len(ESTIMATOR_COLORS)]
+        return own if self.is_newest(name) else faded(own)
 
     def label(self, name: str) -> str:
-        """The estimator's name in legends; with its model where the models differ and the name does not say it."""
+        """The member's name in legends; with its model where the models differ and the name does not say it."""
         model, several = self.member(name).model, len({m.model for m in self.members}) > 1
-        return f"{name} ({model})" if several and model not in name else name
+        label = name if self.is_newest(name) or revision_of(name) else f"{name} as given"
+        return f"{label} ({model})" if several and model not in name else label
 
     def shown(self, si_unit: str) -> Shown:
         """The unit on the screen, and the factor from SI; forces among bodies of a few kilograms are in N."""

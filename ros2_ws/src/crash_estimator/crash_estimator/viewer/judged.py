@@ -1,6 +1,6 @@
 """Blocks -> estimates again, and what the validation says of them (thesis 3.7). Neither ROS nor Rerun here."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import reduce
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from ..core.estimate import Description, Estimate, ParameterStatus
 from ..core.free_run import Comparison, FreeRun, compare, free_run
 from ..core.structure import ModelError, Structure
 from ..core.validation import Validation, validate
-from .blocks import Block, ForceBlock, ParameterBlock, ResidualBlock, join
+from .blocks import Block, ForceBlock, ParameterBlock, ResidualBlock, estimator_of, join, revision_of
 
 MOST = 20_000
 """Samples; of a longer recording nothing is judged here: a viewer must not work for minutes."""
@@ -27,13 +27,16 @@ class Judged(NamedTuple):
 class Jury:
     """Keeps what the estimators say in one pass, and judges it when it is complete."""
 
-    def __init__(self, structure_of: Callable[[str], Structure | None]):
-        """structure_of: a model by its name; None where it is not known."""
+    def __init__(self, structure_of: Callable[[str, int, str], Structure | None]):
+        """structure_of: the model of an estimator, of a revision, with its name; None where it is not known."""
         self.structure_of = structure_of
+        self.judged: dict[str, Judged | None] = {}  # None: it cannot be judged
         self.said: dict[str, list[Block]] = {}
         self.samples: dict[str, int] = {}
 
     def hear(self, block: Block) -> None:
+        if block.estimator in self.judged:
+            return
         kept = self.said.setdefault(block.estimator, [])
         if isinstance(block, ResidualBlock):
             self.samples[block.estimator] = self.samples.get(block.estimator, 0) + len(block.time_ns)
@@ -42,15 +45,15 @@ class Jury:
         else:
             kept.clear()
 
-    def verdicts(self) -> dict[str, Judged]:
-        """By estimator; those that cannot be judged are left out."""
-        found = {}
-        for name, blocks in self.said.items():
-            structure = self.structure_of(blocks[0].model) if blocks else None
-            judged = judge(structure, blocks) if structure else None
-            if judged:
-                found[name] = judged
-        return found
+    def verdicts(self, names: Iterable[str]) -> dict[str, Judged]:
+        """Of these, whose pass is complete, and of those before; who cannot be judged is left out."""
+        for name in names:
+            self.judged[name] = None  # should it fail
+            blocks = self.said.pop(name, [])
+            model = blocks[0].model if blocks else ""
+            structure = self.structure_of(estimator_of(name), revision_of(name), model) if blocks else None
+            self.judged[name] = judge(structure, blocks) if structure else None
+        return {name: judged for name, judged in self.judged.items() if judged}
 
 
 def judge(structure: Structure, blocks: list[Block]) -> Judged | None:

@@ -9,30 +9,34 @@ from itertools import zip_longest
 import rerun.blueprint as rrb
 
 from .cast import Cast
-from .curves import framed, parameter_views, residual_views, signal_views
+from .curves import parameter_views, residual_views, signal_views
 from .loops import loop_views
 from .method import method_tab
 from .missing import missing_tab
 from .motion import motion_view
 from .pen import TIMELINE
 from .states import event_view, state_view
+from .states import lanes as state_lanes
 from .summary import summary_view
 from .validation import validation_tab
 
+MOST_EQUATIONS = 4
+"""In the overview."""
+
 
 def overview(cast: Cast) -> rrb.Container:
-    """Everything at a glance: the figure above two loops; beside them four equations, each with its residual."""
-    signals, residuals = framed(signal_views(cast)[:4], cast), framed(residual_views(cast)[:4], cast)
+    """Everything at a glance: the figure above two loops; beside them four equations."""
+    signals = signal_views(cast)[:MOST_EQUATIONS]
     for view in signals:
         view.name = f"{view.name} (grey: measured)"  # the other colours stand beside the figure and the loops
-    pair = rrb.Vertical if len(signals) == 1 else rrb.Horizontal
+        view.properties["PlotLegend"] = rrb.PlotLegend(visible=False)
     return rrb.Horizontal(
         rrb.Vertical(
             rrb.Tabs(motion_view(cast), summary_view(), event_view()),
             rrb.Horizontal(*loop_views(cast, first_elements(cast)[:2])),
             row_shares=[11, 10],
         ),
-        rrb.Vertical(*(pair(signal, residual) for signal, residual in zip(signals, residuals, strict=False))),
+        rrb.Vertical(*signals),
         name="Overview",
     )
 
@@ -50,7 +54,7 @@ def residuals(cast: Cast) -> rrb.Container:
 def parameters(cast: Cast) -> rrb.Container:
     views = parameter_views(cast)
     plots = rrb.Vertical(*views) if len(views) <= 3 else rrb.Grid(*views, grid_columns=2)
-    return rrb.Vertical(plots, state_view(), row_shares=_above_lanes(cast, most=0.3), name="Parameters")
+    return rrb.Vertical(plots, state_view(cast), row_shares=_above_lanes(cast, most=0.38), name="Parameters")
 
 
 def force_crush(cast: Cast) -> rrb.Container:
@@ -61,7 +65,7 @@ def force_crush(cast: Cast) -> rrb.Container:
 
 def motion(cast: Cast) -> rrb.Container:
     return rrb.Vertical(
-        motion_view(cast), state_view(), row_shares=_above_lanes(cast, most=0.45), name="Motion and states"
+        motion_view(cast), state_view(cast), row_shares=_above_lanes(cast, most=0.45), name="Motion and states"
     )
 
 
@@ -109,5 +113,5 @@ def first_elements(cast: Cast) -> list[str]:
 
 def _above_lanes(cast: Cast, most: float) -> list[float]:
     """Shares of a tab's height for what stands above the state lanes, and for the lanes, which get up to `most`."""
-    lanes = min(0.06 + 0.05 * sum(len(m.elements) for m in cast.members), most)
+    lanes = min(0.1 + 0.035 * len(state_lanes(cast)), most)
     return [1 - lanes, lanes]

@@ -13,10 +13,11 @@ import rerun.blueprint as rrb
 
 from ..core.estimate import ElementState
 from .axes import Axis, axis_for, text
-from .blocks import ForceBlock
-from .cast import Cast, Color
+from .blocks import ForceBlock, revision_of
+from .cast import Cast
+from .colors import GRID, INK, TITLE
 from .frames import frame_ends
-from .pen import TIMELINE, Pen, path, points
+from .pen import TIMELINE, Pen, own_path, path, points
 from .plausible import Limits
 from .units import MM
 
@@ -24,11 +25,10 @@ WIDTH, HEIGHT = 1.35, 1.0
 """Of the plotting area."""
 LINE = 0.115
 """Height of a line of text above it."""
-
-BACKGROUND: Color = (13, 13, 14)
-INK: Color = (170, 170, 170)
-GRID: Color = (48, 48, 50)
-TITLE: Color = (225, 225, 225)
+GRID_WIDTH = 0.15
+"""Pixels: half the width of a grid's lines."""
+FRONT = 10.0
+"""Draw order of the loops, above grid and axes; a newer revision's is in front."""
 
 
 class Extent(NamedTuple):
@@ -64,7 +64,7 @@ class Loops:
 
     def write(self, cast: Cast, block: ForceBlock) -> None:
         ends = frame_ends(block.time_ns, cast.span)
-        color, limit = cast.color(block.estimator), self.limits.force(block)
+        limit = self.limits.force(block)
         factor = cast.shown("N").factor
         for k, element in enumerate(block.element):
             # a gap that opens and closes is not part of the loop, nor is a force out of this world
@@ -74,21 +74,24 @@ class Loops:
             self._fit(cast, element, line)
             if len(line):
                 own_ends = np.unique(np.cumsum(drawn)[ends] - 1)
-                self._draw(block.estimator, element, block.time_ns[drawn], line, own_ends[own_ends >= 0], color)
+                self._draw(block.estimator, element, block.time_ns[drawn], line, own_ends[own_ends >= 0])
 
-    def _draw(
-        self, estimator: str, element: str, time_ns: np.ndarray, line: np.ndarray, ends: np.ndarray, color: Color
-    ) -> None:
-        key = (estimator, element)
+    def _draw(self, who: str, element: str, time_ns: np.ndarray, line: np.ndarray, ends: np.ndarray) -> None:
+        key = (who, element)
         start = self.last_point.get(key, line[0])
         self.last_point[key] = line[-1]
         joined = np.vstack([start, line])  # row i of the line is row i + 1 here
-        strips = [joined[a : b + 2] for a, b in zip(np.append(0, ends[:-1] + 1), ends, strict=False)]
-        entity = loop_path(element, estimator)
-        self.pen.once(entity, lambda: rr.LineStrips2D.from_fields(colors=[color], radii=[points(1.1)]))
+        strips = [joined[a : b + 2] for a, b in zip(np.append(0, ends[:-1] + 1), ends)]
+        entity = loop_path(element, who)
+        order = FRONT + revision_of(who)
+        self.pen.once(entity, lambda cast: rr.LineStrips2D.from_fields(
+            colors=[cast.color(who)], radii=[points(1.1)], draw_order=order
+        ))  # fmt: skip
         self.pen.columns(entity, time_ns[ends], rr.LineStrips2D.columns(strips=strips))
         now = f"{entity}/now"
-        self.pen.once(now, lambda: rr.Points2D.from_fields(colors=[color], radii=[points(4.0)]))
+        self.pen.once(now, lambda cast: rr.Points2D.from_fields(
+            colors=[cast.color(who)], radii=[points(4.0)], draw_order=order
+        ))  # fmt: skip
         self.pen.columns(now, time_ns[ends], rr.Points2D.columns(positions=line[ends]))
 
     def _fit(self, cast: Cast, element: str, line: np.ndarray) -> None:
@@ -97,8 +100,7 @@ class Loops:
         self.extents[element] = after
         if before is None or (before.x, before.y) != (after.x, after.y):
             self._axes(path("force_crush", element), after.x, after.y, f"force, {cast.shown('N').unit}")
-        owners = [m.name for m in cast.members if element in m.elements]
-        self.pen.once(path("force_crush", element, "legend"), lambda: _legend(cast, owners))
+        self.pen.once(path("force_crush", element, "legend"), lambda cast: _legend(cast, element))
 
     def _axes(self, root: str, x: Axis, y: Axis, force: str) -> None:
         scale = np.diag([WIDTH / (x.high - x.low), -HEIGHT / (y.high - y.low), 1.0])
@@ -108,7 +110,7 @@ class Loops:
         up = [-(value - y.low) / (y.high - y.low) * HEIGHT for value in y.ticks]
         grid = [[(u, 0.0), (u, -HEIGHT)] for u in across] + [[(0.0, v), (WIDTH, v)] for v in up]
         zero = [[(origin[0], 0.0), (origin[0], -HEIGHT)], [(0.0, origin[1]), (WIDTH, origin[1])]]
-        self.pen.static(f"{root}/grid", rr.LineStrips2D(grid, colors=[GRID], radii=points(0.4), draw_order=1.0))
+        self.pen.static(f"{root}/grid", rr.LineStrips2D(grid, colors=[GRID], radii=points(GRID_WIDTH), draw_order=1.0))
         self.pen.static(f"{root}/zero", rr.LineStrips2D(zero, colors=[INK], radii=points(0.6), draw_order=2.0))
         at = [(u, 0.01) for u in across] + [(-0.09, v - 0.06) for v in up]
         self.pen.labels(
@@ -118,16 +120,17 @@ class Loops:
         self.pen.labels(f"{root}/titles", at, ["crush, mm", force], TITLE)
 
 
-def _legend(cast: Cast, owners: list[str]) -> rr.Points2D:
-    """One line of text for each estimator, above the plot at the right."""
+def _legend(cast: Cast, element: str) -> rr.Points2D:
+    """One line of text for each member, above the plot at the right."""
+    owners = [m.name for m in cast.members if element in m.elements]
     at = [(0.62 * WIDTH, -HEIGHT - LINE * (1.4 + k)) for k in reversed(range(len(owners)))]
     colors = [cast.color(name) for name in owners]
     labels = [cast.label(name) for name in owners]
     return rr.Points2D(at, labels=labels, colors=colors, radii=points(0.01), show_labels=True)
 
 
-def loop_path(element: str, estimator: str) -> str:
-    return path("force_crush", element, "data", estimator)
+def loop_path(element: str, who: str) -> str:
+    return own_path("force_crush", element, "data", who=who)
 
 
 def loop_views(cast: Cast, elements: Sequence[str]) -> list[rrb.View]:
@@ -141,7 +144,6 @@ def loop_views(cast: Cast, elements: Sequence[str]) -> list[rrb.View]:
         rrb.Spatial2DView(
             origin=path("force_crush", element),
             name=f"{element}: force over crush",
-            background=BACKGROUND,
             visual_bounds=rrb.VisualBounds2D(
                 x_range=[-0.2, WIDTH + 0.1], y_range=[-HEIGHT - LINE * (len(cast.members) + 0.8), 0.24]
             ),

@@ -5,8 +5,9 @@ import rerun.blueprint as rrb
 
 from ..core.estimate import ParameterStatus
 from .blocks import ParameterBlock
-from .cast import ESTIMATOR_COLORS, Cast
-from .pen import Pen, path
+from .cast import Cast
+from .colors import ESTIMATOR_COLORS
+from .pen import Look, Pen, path
 
 MOMENT = "s"
 """Unit of a moment, such as a model's last jump: events tell of it."""
@@ -20,9 +21,9 @@ def write(pen: Pen, block: ParameterBlock) -> None:
             value, std = block.value[:, k], block.std[:, k]
             entity = path("method", block.estimator, kind(name), name)
             if np.isfinite(std).any():
-                pen.band(entity, block.time_ns, value, std, name, color, 1.5)
+                pen.band(entity, block.time_ns, value, std, Look(name, color), 1.5)
             else:
-                pen.curve(entity, block.time_ns, value, name, color, 1.5)
+                pen.curve(entity, block.time_ns, value, Look(name, color), 1.5)
 
 
 def _place(block: ParameterBlock, name: str) -> int:
@@ -37,8 +38,8 @@ def kind(name: str) -> str:
 def method_tab(cast: Cast) -> rrb.Container:
     views = [
         rrb.TimeSeriesView(
-            origin=path("method", m.name, what), name=f"{m.name}: {what}", axis_x=rrb.TimeAxis(link="LinkToGlobal"),
-            plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+            origin=path("method", m.name, what), name=f"{cast.label(m.name)}: {what}",
+            axis_x=rrb.TimeAxis(link="LinkToGlobal"), plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
         )
         for m in cast.members
         for what in dict.fromkeys(kind(name) for name, unit in m.besides if unit != MOMENT)

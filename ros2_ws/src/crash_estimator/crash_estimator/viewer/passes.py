@@ -8,7 +8,7 @@ from pathlib import Path
 
 import rerun as rr
 
-from .blocks import UNKNOWN_TEST, Block, EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock
+from .blocks import UNKNOWN_TEST, Block, EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock, estimator_of
 from .cast import Cast, Member, member
 from .findings import Finding, RankingBlock
 from .judged import Jury
@@ -49,7 +49,7 @@ class Pass:
         self.recordings = [live, file[0]] if file else [live]
         self.path = file[1] if file else None
         self.expected, self.first, self.attempt, self.sent = expected, first, attempt, sent
-        self.jury: Jury | None = jury  # None: it has judged
+        self.jury: Jury | None = jury  # None: it has ended
         self.shows: list[Show] = []  # one for each recording
         self.test: TestBlock | None = None
         self.began: float | None = None
@@ -80,7 +80,8 @@ class Pass:
                 self._heads.setdefault(item.estimator, {})[type(item)] = item
         self._meet(at_once)
         if self.shows:
-            names = self.shows[0].cast.names
+            cast = self.shows[0].cast
+            names = {*cast.names, *cast.estimators}  # events have no revision
             waiting, self._waiting, ready = self._waiting, [], []
             for item in waiting:
                 on_stage = isinstance(item, Finding) or item.estimator in names
@@ -100,13 +101,15 @@ class Pass:
                 self.jury.hear(item)
 
     def judge(self) -> None:
-        """Once, when all have been drawn to the last sample."""
+        """Each member once, when all have been drawn to the last sample; a later revision when it has."""
         if not (self.jury and self.complete):
             return
-        jury, self.jury = self.jury, None
-        judged = self.attempt(jury.verdicts)
-        for show in self.shows if judged else ():
-            show.judge(judged)
+        new = [name for name in self.drawn if name not in self.jury.judged and self._samples(name) >= self.test.samples]
+        if new and self._unsaved:
+            self._save()  # what is judged is in both
+        judged = self.attempt(lambda: self.jury.verdicts(new)) if new else None
+        for show in self.shows if new else ():
+            show.judge(judged or {})
 
     def _save(self) -> None:
         unsaved, self._unsaved = self._unsaved, []
@@ -126,7 +129,7 @@ class Pass:
             self._save()
         if self.path or not overtaken:
             self.judge()
-        self.names = self.shows[0].cast.names if self.shows else ()
+        self.names = tuple(m.name for m in self.shows[0].cast.newest) if self.shows else ()
         for k in reversed(range(len(self.recordings))):  # the file first, whatever a viewer does
             try:
                 if self.shows:
@@ -153,9 +156,12 @@ class Pass:
 
     @property
     def complete(self) -> bool:
-        """Whether every estimator on stage has been drawn to the last sample."""
+        """Whether every estimator on stage has been drawn to the last sample, by one revision of its model at least."""
         total = self.test.samples if self.test else 0
-        return total > 0 and bool(self.drawn) and min(map(self._samples, self.drawn)) >= total
+        most: Counter[str] = Counter()
+        for name in self.drawn:
+            most[estimator_of(name)] = max(most[estimator_of(name)], self._samples(name))
+        return total > 0 and bool(most) and min(most.values()) >= total
 
     def _samples(self, name: str) -> int:
         """Of an estimator, drawn in all there is to them: after a rush its forces come later than the rest."""
@@ -172,14 +178,14 @@ class Pass:
         ready = [name for name, heads in self._heads.items() if heads.keys() == KINDS]
         members = {name: self.attempt(lambda name=name: self._member(name)) for name in ready}
         present = [name for name in ready if members[name]]
-        missing = self.test is None or any(name not in present for name in self.expected)
+        missing = self.test is None or any(name not in map(estimator_of, present) for name in self.expected)
         if not self.shows:
             wait = PATIENCE if missing else 0.0 if self.expected else COURTESY
             begin = self._begin(present)
             if begin is None or (time.monotonic() - self.began < wait and not at_once):
                 return
             order = {name: k for k, name in enumerate(self.expected)}
-            present.sort(key=lambda name: (order.get(name, len(order)), name))
+            present.sort(key=lambda name: (order.get(estimator_of(name), len(order)), name))
             cast = Cast(self.test or UNKNOWN_TEST, self._span(*begin))
         else:
             cast = self.shows[0].cast

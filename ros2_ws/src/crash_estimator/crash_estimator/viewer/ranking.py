@@ -7,20 +7,23 @@ from typing import NamedTuple
 import rerun.blueprint as rrb
 
 from .axes import axis_for
-from .cast import MEASURED, Color
+from .colors import (
+    CONFOUNDED,
+    FLOOR,
+    INK,
+    MEASURED,
+    REVISION_COLORS,
+    STATE_COLORS,
+    TITLE,
+    TOLD,
+    WEAK,
+    Color,
+)
 from .drawing import Drawing, Frame, view
 from .findings import FOUND, Candidate, RankingBlock
-from .loops import INK, TITLE
-from .states import STATE_COLORS, STATES
+from .states import STATES
 from .summary import with_std
 from .units import Shown
-
-TOLD: Color = (90, 205, 110)
-CONFOUNDED: Color = (245, 180, 60)
-WEAK: Color = (105, 105, 110)
-REVISION_COLORS: tuple[Color, ...] = ((240, 95, 80), (90, 205, 110), (70, 165, 255), (190, 140, 255), (235, 110, 205))
-"""As given, then with one effect more each."""
-FLOOR: Color = (245, 220, 70)
 
 CANDIDATES = 6
 REVISIONS = 5
@@ -98,18 +101,10 @@ def error_drawing(steps: Sequence[Step], floor: float, shown: Shown) -> Drawing:
     shown_bars = bars[:1] + bars[1:][1 - REVISIONS :]  # the first and the newest
     title = f"RMS residual of this test, {shown.unit}; noise floor {shown.factor * floor:.3g}"
     drawing = bar_chart(shown_bars, title, rows=REVISIONS, line=shown.factor * floor)
-    keys = [
-        ("measured", MEASURED),
-        *((f"fails {state}", color) for state, color in zip(STATES, STATE_COLORS, strict=False)),
-    ]
-    for at, (key, color) in zip((0.1, 0.34, 0.62, 0.88), keys, strict=False):
-        drawing.text((at, ROW * REVISIONS + 1.5 * LINE), key, _brighter(color))
+    keys = [("measured", MEASURED), *((f"fails {state}", color) for state, color in zip(STATES, STATE_COLORS))]
+    for at, (key, color) in zip((0.1, 0.34, 0.62, 0.88), keys):
+        drawing.text((at, ROW * REVISIONS + 1.5 * LINE), key, color)
     return drawing
-
-
-def _brighter(color: Color) -> Color:
-    """A shade's colour as text: on the dark ground it would hardly be read."""
-    return tuple(min(255, 60 + channel) for channel in color)
 
 
 def revision_color(revision: int) -> Color:

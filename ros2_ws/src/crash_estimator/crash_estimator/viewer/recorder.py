@@ -72,10 +72,10 @@ class Recorder:
         expected: tuple[str, ...] = (),
         limit: int = 100_000,
         say: Callable[[str], None] = print,
-        structure_of: Callable[[str], Structure | None] = lambda name: None,
+        structure_of: Callable[[str, int, str], Structure | None] = lambda estimator, revision, model: None,
     ):
         """expected: estimators that the layout waits for a little; limit: items in the queue; say: told of trouble;
-        structure_of: a model by its name, for the validation; None where it is not known."""
+        structure_of: as in Jury."""
         self.sinks, self.expected, self.limit, self.say = sinks, expected, limit, say
         self.structure_of = structure_of
         self.dropped = 0

@@ -11,19 +11,17 @@ import rerun.blueprint as rrb
 
 from ..core.validation import autocorrelation
 from .axes import Axis
-from .cast import MEASURED, Cast, Color
-from .curves import BAND
+from .cast import Cast
+from .colors import FLOOR, INK, MEASURED, STATE_COLORS, Color
+from .curves import BAND, NOISE, SO_FAR, WHOLE
 from .drawing import Drawing, Frame, view
 from .findings import EFFECT_MISSING, MisfitBlock, RankingBlock, RevisionBlock, Window
-from .loops import INK
-from .pen import Pen, path
-from .ranking import FLOOR, Step, error_drawing, revision_color
-from .states import STATE_COLORS, STATES
+from .pen import Look, Pen, path
+from .ranking import Step, error_drawing, revision_color
+from .states import STATES
 
 LAGS = 40
 """Samples."""
-SO_FAR, WHOLE = "so_far", "whole"
-"""Parts of an entity's path: what was said while samples came, and after the last one."""
 
 SHADE = 1e6
 """Height of a misfit's shade, beyond any value; the axis does not follow it."""
@@ -58,18 +56,18 @@ class Revisions:
             self._errors(cast)
 
     def _curves(self, cast: Cast, block: RevisionBlock, revision: int, part: str) -> None:
-        color, label, time_ns = revision_color(revision), f"{revision} {block.label}", block.time_ns
-        for k, (body, si_unit) in enumerate(zip(block.name, block.unit, strict=True)):
+        look, time_ns = Look(f"{revision} {block.label}", revision_color(revision)), block.time_ns
+        for k, (body, si_unit) in enumerate(zip(block.name, block.unit)):
             factor = cast.shown(si_unit).factor
             if revision == 0:
                 measured = path("revision", body, part, "measured")
-                self.pen.curve(measured, time_ns, factor * block.measured[:, k], "measured", MEASURED, 3.0)
+                self.pen.curve(measured, time_ns, factor * block.measured[:, k], Look("measured", MEASURED), 3.0)
                 band = BAND * factor * block.residual_std[:, k]
-                self.pen.band(path("left", body, part, "band"), time_ns, 0.0 * band, band, "noise, 99 %", INK, 0.5)
+                self.pen.band(path("left", body, part, "band"), time_ns, 0.0 * band, band, NOISE, 0.5)
             name = f"{revision:02}"
             predicted, left = factor * block.predicted[:, k], factor * block.residual[:, k]
-            self.pen.curve(path("revision", body, part, "model", name), time_ns, predicted, label, color, 1.5)
-            self.pen.curve(path("left", body, part, "model", name), time_ns, left, label, color, 1.2)
+            self.pen.curve(path("revision", body, part, "model", name), time_ns, predicted, look, 1.5)
+            self.pen.curve(path("left", body, part, "model", name), time_ns, left, look, 1.2)
 
     def _whiteness(self) -> None:
         blocks = list(self.whole.values())
@@ -127,7 +125,7 @@ class Revisions:
             self.shaded_to[entity] = end
         time_ns, center = np.array(rows).T
         time_ns = np.round(time_ns * 1e9).astype(np.int64)
-        self.pen.band(entity, time_ns, center, center + SHADE, name, color, 0.1)
+        self.pen.band(entity, time_ns, center, center + SHADE, Look(name, color), 0.1)
 
 
 def _rms(block: RevisionBlock, mass: float) -> float:

@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from rerun.experimental import ViewerClient
@@ -22,6 +24,11 @@ LIBRARIES = (
 )
 """Debian packages that drawing without a screen takes."""
 
+SIZE = (1600, 900)
+"""Pixels, of a usual screen: what can be read on it must be readable."""
+PATIENCE = 60.0
+"""s for each of three steps."""
+
 
 class ScreenshotError(Fault):
     """The viewer did not start or did not draw; the message is one readable line."""
@@ -31,14 +38,44 @@ def screenshot(
     rrd: str | Path,
     png: str | Path,
     at: float | None = None,
-    size: tuple[int, int] = (1600, 900),
-    patience: float = 60.0,
+    size: tuple[int, int] = SIZE,
+    patience: float = PATIENCE,
 ) -> None:
     """Draw a recording as the viewer would show it, the time cursor at `at` s since the impact (None: at the end).
 
     Raises ScreenshotError where no viewer can run; what it needs is in LIBRARIES. OutputError: it cannot be written.
     """
-    rrd, png = Path(rrd).resolve(), Path(png).absolute()
+    png = Path(png).absolute()
+    with _viewer_of(Path(rrd), at, size, patience) as viewer:
+        write_bytes(png, _settled_picture(viewer, time.monotonic() + patience))
+
+
+def screenshots(
+    rrd: str | Path,
+    folder: str | Path,
+    at: float | None = None,
+    size: tuple[int, int] = SIZE,
+    patience: float = PATIENCE,
+) -> dict[str, Path]:
+    """A picture of every tab, `missing_effect.png` of "Missing effect" -> those written, by tab; as `screenshot`."""
+    folder, written = Path(folder).absolute(), {}
+    folder.mkdir(parents=True, exist_ok=True)
+    with _viewer_of(Path(rrd), at, size, patience) as viewer:
+        layout = viewer.get_blueprint().blueprint
+        root = layout[f"/container/{layout['/viewport']['ViewportBlueprint']['root_container']}"]["ContainerBlueprint"]
+        for tab in root["contents"]:
+            name = layout[f"/{tab}"]["ContainerBlueprint"]["display_name"]
+            root["active_tab"] = tab
+            viewer.set_blueprint(layout, "recording")
+            written[name] = folder / f"{name.lower().replace(' ', '_')}.png"
+            write_bytes(written[name], _settled_picture(viewer, time.monotonic() + patience))
+    return written
+
+
+@contextmanager
+def _viewer_of(rrd: Path, at: float | None, size: tuple[int, int], patience: float) -> Iterator[ViewerClient]:
+    """A viewer without a window that has loaded the recording."""
+    rrd = rrd.resolve()
     if not rrd.is_file():
         raise ScreenshotError(f"{rrd}: no such recording")
     port = usable_port(0)
@@ -58,7 +95,7 @@ def screenshot(
             _wait_until_loaded(viewer, time.monotonic() + patience)
             if at is not None:
                 viewer.set_time(TIMELINE, duration=at, play_state="paused")
-            write_bytes(png, _settled_picture(viewer, time.monotonic() + patience))
+            yield viewer
         except ConnectionError as error:  # it had answered: where it cannot draw it stops a moment later
             raise _stopped(process) from error
         finally:
@@ -114,16 +151,21 @@ def main(argv: list[str] | None = None) -> int:
 def _command(argv: list[str] | None) -> None:
     parser = Parser(prog="screenshot", description="Draw a Rerun recording into a PNG file.")
     parser.add_argument("rrd")
-    parser.add_argument("png")
+    parser.add_argument("png", help="with --every-tab: a folder")
     parser.add_argument("--at", type=float, help="time cursor, s since the impact (default: the end)")
     parser.add_argument("--size", default="1600x900", help="WIDTHxHEIGHT in pixels")
-    parser.add_argument("--patience", type=float, default=60.0, help="s for each of three steps (default: 60)")
+    parser.add_argument("--patience", type=float, default=PATIENCE, help="s for each of three steps (default: 60)")
+    parser.add_argument("--every-tab", action="store_true", help="a picture of each tab, named after it")
     arguments = parser.parse_args(argv)
     width, _, height = arguments.size.partition("x")
     if not (width.isdigit() and height.isdigit()):
         parser.error(f"--size must be WIDTHxHEIGHT such as 1600x900, got {arguments.size!r}")
-    check_outputs({"PNG": arguments.png}, [arguments.rrd])
-    screenshot(arguments.rrd, arguments.png, arguments.at, (int(width), int(height)), arguments.patience)
+    size = int(width), int(height)
+    if arguments.every_tab:
+        screenshots(arguments.rrd, arguments.png, arguments.at, size, arguments.patience)
+    else:
+        check_outputs({"PNG": arguments.png}, [arguments.rrd])
+        screenshot(arguments.rrd, arguments.png, arguments.at, size, arguments.patience)
 
 
 if __name__ == "__main__":

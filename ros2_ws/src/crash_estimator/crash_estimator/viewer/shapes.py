@@ -4,8 +4,8 @@ import numpy as np
 import rerun as rr
 
 from .axes import round_up, text
-from .cast import Cast, Color, Member
-from .loops import INK
+from .cast import Cast, Member
+from .colors import APART, FORCE_COLORS, INK, Color
 from .pen import Pen, path, points
 from .schematic import Schematic, schematic
 from .units import MM
@@ -18,21 +18,26 @@ PITCH = REST + 2 * BODY
 ROW, MARGIN = 0.46, 0.12
 TITLE_ROOM, LABEL_ROOM, LEGEND_ROOM = 0.2, 0.24, 0.3
 
-BODY_COLOR: Color = (62, 74, 92)
-PLATE_COLOR: Color = (70, 70, 72)
-EDGE: Color = (150, 165, 190)
-APART: Color = (85, 85, 85)
-FORCE_COLORS = np.array([(70, 140, 255), (165, 165, 165), (250, 205, 70), (255, 60, 45)], dtype=float)
 FORCE_AT = np.array([-1.0, 0.0, 0.45, 1.0])
-"""Share of the largest force at which each colour stands: tension is blue, compression yellow to red."""
+"""Where each of FORCE_COLORS stands: tension is blue, compression yellow to red."""
 
 
 def force_colors(share: np.ndarray, apart: np.ndarray | bool = False) -> np.ndarray:
-    """(..., 3) colours of forces given as shares of the largest one."""
-    channels = [np.interp(share, FORCE_AT, FORCE_COLORS[:, k]) for k in range(3)]
+    """(..., 3) colours of forces given as shares of the largest one.
+
+    By the square root, so that a tenth of the largest force is not grey: most springs carry less than one of them.
+    """
+    at = np.sign(share) * np.sqrt(np.abs(share))
+    channels = [np.interp(at, FORCE_AT, np.array(FORCE_COLORS, dtype=float)[:, k]) for k in range(3)]
     colors = np.stack(channels, axis=-1)
     colors[np.broadcast_to(apart, share.shape)] = APART
     return colors.astype(np.uint8)
+
+
+def force_scale(largest: float) -> float:
+    """A round number just above the largest force."""
+    power = 10.0 ** np.floor(np.log10(largest))
+    return float(next(digit * power for digit in (1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10) if digit * power >= largest))
 
 
 def filled(half: tuple[float, float], color: Color) -> rr.LineStrips2D:
@@ -42,7 +47,7 @@ def filled(half: tuple[float, float], color: Color) -> rr.LineStrips2D:
     x, y = half[0] - radius, half[1] - radius
     across = [[(-x, v), (x, v)] for v in np.linspace(-y, y, lines)]
     ends = [[(u, -y), (u, y)] for u in (-x, x)]
-    return rr.LineStrips2D(across + ends, colors=[color], radii=1.05 * radius, draw_order=1.0)
+    return rr.LineStrips2D(across + ends, colors=[color], radii=1.3 * radius, draw_order=1.0)
 
 
 def zigzag(turns: int = 7) -> np.ndarray:
@@ -70,21 +75,22 @@ def lane_height(member: Member) -> float:
 
 
 def lanes_height(cast: Cast) -> float:
-    return sum(lane_height(m) for m in cast.members)
+    return sum(lane_height(m) for m in cast.newest)
 
 
 def legend(pen: Pen, cast: Cast, length: float, force: float) -> None:
     """What colours and lengths mean: `length` m of crush take all of a spring's length, `force` N are red."""
     bottom = lanes_height(cast) + 0.08
-    shares = np.linspace(-1.0, 1.0, 41)
-    x = 1.75 + 0.85 * shares
-    bar = [[(a, bottom), (b, bottom)] for a, b in zip(x[:-1], x[1:], strict=True)]
-    colors = force_colors(0.5 * (shares[:-1] + shares[1:]))
+    along = np.linspace(-1.0, 1.0, 41)
+    x = 1.75 + 0.85 * along
+    bar = [[(a, bottom), (b, bottom)] for a, b in zip(x[:-1], x[1:])]
+    middles = 0.5 * (along[:-1] + along[1:])
+    colors = force_colors(np.sign(middles) * middles**2)
     pen.static(path("motion", "legend", "force"), rr.LineStrips2D(bar, colors=colors, radii=points(3.0)))
     unit, factor = cast.shown("N")
-    end = text(force * factor, force * factor)
+    end = f"{force * factor:.3g}"
     texts = [f"tension −{end} {unit}", "0", f"{end} {unit} compression"]
-    at = [(x[0], bottom + 0.01), (x[20], bottom + 0.01), (x[-1], bottom + 0.01)]
+    at = [(x[k], bottom + 0.01) for k in (0, 20, 40)]
     pen.labels(path("motion", "legend", "force", "text"), at, texts, INK)
     measure = round_up(length / 4)
     drawn = REST * measure / length

@@ -58,14 +58,26 @@ class Sinks:
         return recording, path
 
 
-def send_layout(recording: rr.RecordingStream, layout: rrb.Blueprint, make_active: bool) -> None:
-    """As `recording.send_blueprint` does, which for each layout leaves a recording in memory that holds itself."""
+ALL_VIEWS = "view/5c0dca6a-e63f-9cf7-f657-2602590474cc"
+"""Where Rerun keeps what all linked plots share (GLOBAL_VIEW_ID of its re_viewer_context); the SDK cannot say it."""
+
+
+def send_layout(
+    recording: rr.RecordingStream, layout: rrb.Blueprint, make_active: bool, times: tuple[float, float] | None = None
+) -> None:
+    """As `recording.send_blueprint` does, which for each layout leaves a recording in memory that holds itself.
+
+    times: what the linked time axes show, s.
+    """
     native = bindings.new_blueprint(
         application_id=APPLICATION, make_default=False, make_thread_default=False, default_enabled=True
     )
     written = rr.RecordingStream._from_native(native)
     written.set_time("blueprint", sequence=0)
     layout._log_to_stream(written)
+    if times:
+        start, end = (rr.TimeRangeBoundary.absolute(seconds=time) for time in times)
+        written.log(f"{ALL_VIEWS}/TimeAxis", rrb.TimeAxis(view_range=rr.TimeRange(start=start, end=end)))
     bindings.send_blueprint(written.memory_recording().storage, make_active, True, recording=recording.to_native())
     written.disconnect()
 

@@ -10,7 +10,7 @@ from crash_replay.foreign_text import markdown
 
 from .blocks import ParameterBlock, ResidualBlock
 from .cast import Cast
-from .curves import BAND
+from .noise import NoiseFloor
 from .pen import Pen
 
 Key = tuple[str, str]  # (estimator, equation or parameter)
@@ -19,9 +19,10 @@ Key = tuple[str, str]  # (estimator, equation or parameter)
 class Summary:
     """Adds up what the table says; `write` logs it."""
 
-    def __init__(self, pen: Pen):
+    def __init__(self, pen: Pen, noise: NoiseFloor):
         self.pen = pen
-        self.errors: dict[Key, np.ndarray] = {}  # [samples, sum of squared residuals, samples inside the band]
+        self.noise = noise
+        self.errors: dict[Key, np.ndarray] = {}  # [samples, sum of squared residuals]
         self.parameters: dict[Key, tuple[float, float]] = {}
         self.time_ns = 0
         self.incomplete = ""  # what the whole recording lacks
@@ -30,10 +31,8 @@ class Summary:
         """From the impact on."""
         after = block.time_ns >= 0
         for k, body in enumerate(block.name):
-            residual, std = block.residual[after, k], block.residual_std[after, k]
-            valid = ~np.isnan(residual)
-            inside = np.abs(residual[valid]) <= BAND * std[valid]
-            sums = np.array([valid.sum(), np.sum(residual[valid] ** 2), inside.sum()], dtype=float)
+            residual = block.residual[after, k]
+            sums = np.array([np.isfinite(residual).sum(), np.nansum(residual**2)], dtype=float)
             self.errors[block.estimator, body] = self.errors.get((block.estimator, body), 0.0) + sums
         self.time_ns = max(self.time_ns, int(block.time_ns[-1]))
 
@@ -50,7 +49,7 @@ class Summary:
         """Markdown: rows are equations and parameters, columns estimators."""
         names = cast.names
         lines = [f"**{markdown(cast.test.id)}** {markdown(cast.test.title)}", ""]
-        lines += [row("", list(names)), "|---|" + "---:|" * len(names)]
+        lines += [row("", [cast.label(name) for name in names]), "|---|" + "---:|" * len(names)]
         lines.append(row("model", [m.model for m in cast.members]))
         lines.append(row("method", [m.method for m in cast.members]))
         lines.append(_group("RMS residual", len(names)))
@@ -63,19 +62,20 @@ class Summary:
             cells = [self._parameter(name, parameter, shown.factor) for name in names]
             symbol = parameter.replace(".stiffness", " K").replace(".damping", " C")
             lines.append(row(f"{symbol}, {shown.unit}", cells))
-        lines.append(_group("inside the 99 % band", len(names)))
+        lines.append(_group("RMS residual / noise", len(names)))
         for body, _ in cast.equations:
-            lines.append(row(body, [self._inside(name, body) for name in names]))
+            lines.append(row(body, [self._times_the_noise(name, body) for name in names]))
         lines += ["", f"**incomplete:** {markdown(self.incomplete)}"] * bool(self.incomplete)
         return "\n".join(lines)
 
     def _rms(self, name: str, body: str, factor: float) -> str:
-        count, squares, _ = self.errors.get((name, body), (0.0, 0.0, 0.0))
+        count, squares = self.errors.get((name, body), (0.0, 0.0))
         return f"{factor * np.sqrt(squares / count):.3g}" if count else "–"
 
-    def _inside(self, name: str, body: str) -> str:
-        count, _, inside = self.errors.get((name, body), (0.0, 0.0, 0.0))
-        return f"{100 * inside / count:.1f} %" if count else "–"
+    def _times_the_noise(self, name: str, body: str) -> str:
+        """1: nothing but noise is left."""
+        noise = self.noise.known(body)
+        return self._rms(name, body, 1.0 / noise) if noise > 0.0 else "–"
 
     def _parameter(self, name: str, parameter: str, factor: float) -> str:
         if (name, parameter) not in self.parameters:

@@ -11,15 +11,14 @@ from crash_replay.foreign_text import markdown
 from ..core.validation import LEVELS, Correlation, EquationValidation
 from ..validation_tables import strongest_input
 from .axes import Axis
-from .cast import MEASURED, Cast, Color
+from .cast import Cast
+from .colors import INK, LIMIT_COLORS, MEASURED
+from .curves import early_corner
 from .drawing import Drawing, Frame, view
 from .judged import Judged
-from .loops import INK
-from .pen import TIMELINE, Pen, path
+from .pen import TIMELINE, Look, Pen, own_path, path
 from .summary import row
 
-LIMIT_COLORS: tuple[Color, ...] = ((120, 120, 70), (245, 220, 70), (235, 110, 80))
-"""Of the 90, 95 and 99 % limits."""
 MOST_EQUATIONS = 4
 
 
@@ -123,14 +122,15 @@ def _free_runs(pen: Pen, cast: Cast, judged: Mapping[str, Judged]) -> None:
             if body not in measured:
                 measured.add(body)
                 values = factor * one.simulated.measured[:, k]
-                pen.curve(path("free_run", body, "measured"), time_ns, values, "measured", MEASURED, 3.0)
+                pen.curve(path("free_run", body, "measured"), time_ns, values, Look("measured", MEASURED), 3.0)
             values = factor * one.simulated.predicted[:, k]
-            pen.curve(path("free_run", body, "model", name), time_ns, values, cast.label(name), cast.color(name), 1.5)
+            pen.curve(own_path("free_run", body, who=name), time_ns, values, Look(of=name), 1.5)
 
 
 def validation_tab(cast: Cast) -> rrb.Container:
     """Tables at the left; correlations of each equation in the middle; free runs at the right."""
-    tables = [rrb.TextDocumentView(origin=path("validation", "tables", name), name=name) for name in cast.judged]
+    judged = [m.name for m in cast.members if m.name in cast.judged]
+    tables = [rrb.TextDocumentView(origin=path("validation", "tables", name), name=cast.label(name)) for name in judged]
     bodies = cast.equations[:MOST_EQUATIONS]
     least = rrb.Vertical if max(len(cast.inputs_of(body)) for body, _ in bodies) <= 2 else rrb.Grid
     correlations = [
@@ -147,7 +147,7 @@ def validation_tab(cast: Cast) -> rrb.Container:
     free_runs = [
         rrb.TimeSeriesView(
             origin=path("free_run", body), name=f"{body}: simulated freely, {cast.shown(unit).unit}",
-            axis_x=rrb.TimeAxis(link="LinkToGlobal"), plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+            axis_x=rrb.TimeAxis(link="LinkToGlobal"), plot_legend=rrb.PlotLegend(early_corner(cast, body)),
         )
         for body, unit in bodies
     ]  # fmt: skip

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..bag import read_bag
+from ..bag_namespace import parted
 from ..recording import Recording, RecordingError
 from . import csv_yaml, isomme, nhtsa
 from .description import apply_names
@@ -23,6 +24,7 @@ class Reader(NamedTuple):
 
 def is_bag(path: Path) -> bool:
     """A rosbag2 folder or an .mcap file, as far as its names tell."""
+    path, _ = parted(path)
     return path.suffix == ".mcap" or (path.is_dir() and ((path / "metadata.yaml").exists() or any(path.glob("*.mcap"))))
 
 
@@ -56,11 +58,13 @@ def read_source(path: str | Path, names: str | Path | None = None, **options: An
 
 
 def name_of(source: str | Path) -> str:
-    """What files made of a recording are called after: crash of crash.csv, nhtsa-10146 of nhtsa:10146."""
+    """What files made of a recording are called after: crash of crash.csv, two-sled_a of two.mcap#sled_a, nhtsa-10146
+    of nhtsa:10146."""
     if str(source).startswith(NHTSA):
         return str(source).replace(":", "-")
-    path = Path(source)
-    return path.resolve().name if path.is_dir() else path.stem
+    path, namespace = parted(source)
+    name = path.resolve().name if path.is_dir() else path.stem
+    return name + (namespace or "").replace("/", "-")
 
 
 def _folder_or_file(source: str | Path) -> Path:
@@ -72,7 +76,7 @@ def _folder_or_file(source: str | Path) -> Path:
 
 
 def _reader_for(path: Path) -> Reader:
-    if not path.exists():
+    if not parted(path)[0].exists():
         raise RecordingError(f"{path}: there is no such file or folder")
     for reader in READERS:
         if reader.found(path):

@@ -7,6 +7,7 @@ import numpy as np
 from crash_replay.recording import Recording
 from crash_replay.said import say
 
+from ...core.derived_motion import with_accelerations
 from ...core.errors import EquationError, equation_errors
 from ...core.estimate import Description, ElementState, Estimate, ParameterStatus
 from ...core.fold import run
@@ -20,7 +21,7 @@ def estimate(arguments: argparse.Namespace) -> None:
     check_written(arguments, arguments.bag, json=arguments.json)
     effects = effects_of(arguments)
     structure = load_model(arguments.model, effects)
-    recording = read_crash(arguments.bag)
+    structure, (recording,) = with_accelerations(structure, [read_crash(arguments.bag)])
     settings = parse_settings(arguments.set) | ({"effective_mass": True} if arguments.effective_mass else {})
     estimator = make_estimator(structure, recording.test, arguments.method, effects=effects, **settings)
     estimates = run(estimator, recording.samples())

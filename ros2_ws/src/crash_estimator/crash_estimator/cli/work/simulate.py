@@ -10,6 +10,7 @@ from crash_replay.said import say
 from crash_replay.shown_units import readable
 
 from ...core.characteristic import Characteristic, characteristics
+from ...core.derived_motion import with_accelerations
 from ...core.effects.applied import applied
 from ...core.fold import run
 from ...core.free_run import Comparison, FreeRun, compare, free_run
@@ -27,20 +28,21 @@ FILTER = 60
 def simulate(arguments: argparse.Namespace) -> None:
     check_written(arguments, arguments.bag, arguments.source, json=arguments.json)
     effects = effects_of(arguments)
-    model = load_model(arguments.model, effects)
+    model = as_given = load_model(arguments.model, effects)
     settings = parse_settings(arguments.set) | {"effects": effects}
     recording = read_crash(arguments.bag)
     if not arguments.end > 0.0:
         raise ModelError(f"--end must be a time after the impact, above 0 s, got {arguments.end:g}")
+    model, (recording,) = with_accelerations(model, [recording])
     estimator = make_estimator(model, recording.test, arguments.method, **settings)
     estimates = run(estimator, recording.samples())
     description, structure = estimator.description, applied(model, recording.test, effects)
     laws = characteristics(structure, description, estimates)
     if arguments.source:
-        other = read_crash(arguments.source)
+        _, (other,) = with_accelerations(as_given, [read_crash(arguments.source)])
         donor = make_estimator(model, other.test, arguments.method, **settings)
         laws = characteristics(structure, donor.description, run(donor, other.samples()))
-    simulated = free_run(structure, description, estimates, laws, arguments.end)
+    simulated = free_run(structure, description, estimates, laws, arguments.end, recording)
     smooth, said = smoother(recording, arguments.cfc)
     comparisons = compare(structure, description, simulated, smooth)
     origin = f"forces over crush of {other.test.id}" if arguments.source else "its own forces over crush"

@@ -39,6 +39,7 @@ class Sampling(NamedTuple):
     """How body rows become outputs: q outputs, averaged over bins of samples."""
 
     body: np.ndarray  # (q,)
+    of_motion: np.ndarray  # (q,) 0: the row itself, 1: its integral, 2: the integral of that
     gain: np.ndarray  # (q,)
     lag: np.ndarray  # (q,) whole steps of the grid
     fraction: np.ndarray  # (q,) and the rest of a step

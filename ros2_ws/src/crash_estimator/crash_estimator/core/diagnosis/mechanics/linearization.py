@@ -85,8 +85,14 @@ def linearise(
     for term, k, load in body_loads(layout, record, attached_inertia(layout, record, trajectory)):
         loads[:, k] += float(theta[term.coefficient]) * load
         actions.act(term.coefficient, k, inverse[k] * load)
+    for k, body in enumerate(layout.structure.bodies):
+        if body.applied:
+            loads[:, k] += record.signals[body.applied].on_grid
     rows = loads * inverse
     rows[:, driven] = trajectory.a[:, driven]
+    for k, parameter in layout.kicks[r].items():
+        rows[:, k] += theta[parameter] * record.kick
+        actions.act(parameter, k, record.kick)
     for k, parameter, share in mass_shares(layout):
         actions.act(parameter, k, -share * inverse[k] * rows[:, k])
     for k, parameter, column in driven_by(experiment, theta):

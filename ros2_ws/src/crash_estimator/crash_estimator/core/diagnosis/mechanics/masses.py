@@ -66,6 +66,8 @@ def balance_of(experiment: Experiment, theta: np.ndarray) -> np.ndarray:
     for k, body in enumerate(layout.structure.bodies):
         if body.free:
             force -= mass[k] * motion.a[:, k]
+        if body.applied:
+            force += record.signals[body.applied].on_grid
     for term, _, load in body_loads(layout, record, lambda channel: motion.a[:, layout.attached[channel]]):
         force += theta[term.coefficient] * load
     return force

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..observation.trajectory import Trajectory
 from ..parameterization.experiment import Experiment
 from ..parameterization.layout import Layout
 from .driven_motion import distortion
@@ -61,6 +62,7 @@ def sampling(experiment: Experiment, theta: np.ndarray) -> tuple[Sampling, list[
     parameters = [p for d in found for p in d.parameters if p >= 0]
     return Sampling(
         body=np.array([output.body for output in layout.outputs]),
+        of_motion=np.array([output.of_motion for output in layout.outputs]),
         gain=np.array([1.0 + d.gain for d in found]),
         lag=np.floor(lag).astype(int),
         fraction=lag - np.floor(lag),
@@ -69,18 +71,22 @@ def sampling(experiment: Experiment, theta: np.ndarray) -> tuple[Sampling, list[
     ), parameters
 
 
-def predicted(experiment: Experiment, theta: np.ndarray, rows: np.ndarray):
-    """(g, q) outputs that rows (g, b) give, and the columns of what acts on outputs only: (q, parameter, (g,))."""
+def predicted(experiment: Experiment, theta: np.ndarray, rows: np.ndarray, trajectory: Trajectory):
+    """(g, q) outputs, and the columns of what acts on outputs only: (q, parameter, (g,)).
+
+    Accelerations and forces are those of rows (g, b), velocities and displacements the trajectory's.
+    """
     layout, record, r = experiment
     outputs, by = np.zeros((len(record.time), len(layout.outputs))), []
     step = record.step
     for q, output in enumerate(layout.outputs):
         d = distortion(layout, theta, output.channel)
+        shown = (rows, trajectory.v, trajectory.x)[output.of_motion][:, output.body]
         lag = d.delay / step
         whole, fraction = int(np.floor(lag)), lag - np.floor(lag)
-        true = (1.0 - fraction) * _delayed(rows[:, output.body], whole)
+        true = (1.0 - fraction) * _delayed(shown, whole)
         if fraction:
-            true += fraction * _delayed(rows[:, output.body], whole + 1)
+            true += fraction * _delayed(shown, whole + 1)
             true[whole : whole + 1] = 0.0  # still an instant before the impact
         offset = layout.offsets[r] + q
         outputs[:, q] = (1.0 + d.gain) * true + d.offset + theta[offset]
@@ -91,7 +97,7 @@ def predicted(experiment: Experiment, theta: np.ndarray, rows: np.ndarray):
         if jump >= 0:
             by.append((q, jump, np.ones(len(true))))
         if delay >= 0:
-            slope = (_delayed(rows[:, output.body], whole + 1) - _delayed(rows[:, output.body], whole)) / step
+            slope = (_delayed(shown, whole + 1) - _delayed(shown, whole)) / step
             slope[whole : whole + 1] *= fraction == 0.0
             by.append((q, delay, (1.0 + d.gain) * slope))
     return outputs, by

@@ -5,18 +5,20 @@ force is measured by is one output; outputs are compared in means over short bin
 crash model can say ends far below 1 kHz.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
-from crash_replay.recording import Recording, Test
+from crash_replay.recording import SI_UNIT, Recording, Test
 
+from ...derived_motion import between_samples, smoothed
 from ...kinematics import Kinematics
+from ...sensor_noise import sensor_noise
 from ...structure import ModelError, Structure
-from .sensor_noise import sensor_noise
-
-LONGEST_STEP = 1.5e-4
-"""s: the linear-acceleration step's phase error is (omega dt)^2 / 24: 2e-5 for the stiffest contact, 200 rad/s."""
+from .pace import longest_step
+from .tracked_motion import tracked_acceleration
 
 BIN = 4e-4
 """s: length of the bins that outputs are averaged over."""
@@ -44,7 +46,21 @@ class Output(NamedTuple):
 
     channel: str
     body: int
-    fixed: bool  # a force on a fixed body
+    quantity: str  # acceleration, velocity or displacement of a free body, or force on a fixed one
+    to_acceleration: float = 1.0  # 1/kg, 1/s or 1/s^2, by which it counts beside accelerations
+
+    @property
+    def fixed(self) -> bool:
+        return self.quantity == "force"
+
+    @property
+    def unit(self) -> str:
+        return SI_UNIT[self.quantity]
+
+    @property
+    def of_motion(self) -> int:
+        """Times that the acceleration is integrated: 0, 1 or 2."""
+        return {"velocity": 1, "displacement": 2}.get(self.quantity, 0)
 
 
 class ObservedRecord(NamedTuple):
@@ -76,16 +92,53 @@ class ObservedRecord(NamedTuple):
         return self.whitener is not None
 
     @property
+    def kick(self) -> np.ndarray:
+        """(g,) acceleration in the first step that changes the velocity by 1 m/s."""
+        found = np.zeros(len(self.time))
+        found[1] = 2.0 / (self.time[2] - self.time[0])
+        return found
+
+    @property
     def per_bin(self) -> int:
         return round(len(self.at) / self.bins)
 
 
 def outputs_of(structure: Structure) -> tuple[Output, ...]:
-    """Every channel of every free body, and the measured force of every fixed one."""
-    found = []
+    """Every channel of every free body, and the measured force of every fixed one, which counts divided by the mass of
+    all free bodies.
+
+    The displacement of a body that no spring holds is none: errors of the forces on it add up to any distance. Where it
+    is all there is, the acceleration derived from it takes its place.
+    """
+    found: list[Output] = []
+    mass = sum(body.mass for body in structure.bodies if body.free) or 1.0
     for k in structure.equations:
         body = structure.bodies[k]
-        found += [Output(name, k, False) for name in body.acceleration] if body.free else [Output(body.force, k, True)]
+        if body.fixed:
+            found.append(Output(body.force, k, "force", 1.0 / mass))
+            continue
+        of_motion = [Output(body.velocity, k, "velocity")] if body.velocity else []
+        if body.displacement and structure.is_held(k):
+            of_motion.append(Output(body.displacement, k, "displacement"))
+        if not (body.derived and of_motion):
+            found += [Output(name, k, "acceleration") for name in body.acceleration]
+        found += of_motion
+    return tuple(found)
+
+
+def comparable(
+    outputs: Sequence[Output], structure: Structure, records: Sequence[ObservedRecord]
+) -> tuple[Output, ...]:
+    """Outputs whose sizes can be compared: a displacement counts as an acceleration of the body's own frequency."""
+    found = []
+    for output in outputs:
+        if output.of_motion:
+            channels = structure.bodies[output.body].acceleration
+            a = [np.mean([record.signals[name].on_grid for name in channels], axis=0) for record in records]
+            x = [record.signals[output.channel].on_grid for record in records]
+            spread = max(max(float(np.std(each)) for each in x), np.finfo(float).tiny)
+            output = output._replace(to_acceleration=max(float(np.std(each)) for each in a) / spread)
+        found.append(output)
     return tuple(found)
 
 
@@ -98,11 +151,20 @@ def observe(structure: Structure, recording: Recording) -> ObservedRecord:
             f"test {recording.test.id} has {np.count_nonzero(after)} samples after the impact, too few to fit"
         )
     sample_time = recording.time_ns[after] * 1e-9
-    time, at = _grid(sample_time)
+    time, at = _grid(sample_time, longest_step(structure, recording))
     outputs = outputs_of(structure)
     names = [name for _, name, _ in structure.channels()]
     names += [c.name for c in recording.test.channels if c.quantity == "acceleration"]
     signals = {name: _signal(recording, name, time) for name in dict.fromkeys(names)}
+    start = np.array([kinematics.initial_displacement, kinematics.initial_velocity])
+    for k, body in enumerate(structure.bodies):
+        if body.applied:
+            force = between_samples(recording.time, recording.column(body.applied))
+            signals[body.applied] = signals[body.applied]._replace(on_grid=force(time))
+        if body.derived and body.displacement:
+            name, x = body.acceleration[0], signals[body.displacement]
+            path = CubicSpline(x.time, smoothed(x.values, recording.sample_period).value)
+            signals[name] = signals[name]._replace(on_grid=tracked_acceleration(time, path, *start[:, k]))
     measured = np.stack([_raw(recording, o.channel, signals[o.channel])[after] for o in outputs], axis=1)
     given = [structure.bodies[o.body].noise for o in outputs]
     noise = np.array([g or signals[o.channel].noise for g, o in zip(given, outputs)])
@@ -118,7 +180,7 @@ def observe(structure: Structure, recording: Recording) -> ObservedRecord:
         on_grid=on_grid(time, at, measured),
         noise=noise,
         noise_samples=np.array([np.inf if g else signals[o.channel].noise_samples for g, o in zip(given, outputs)]),
-        offset_std=np.array([signals[o.channel].offset_std for o in outputs]),
+        offset_std=np.array([_offset_std(signals[o.channel], o) for o in outputs]),
         signals=signals,
         initial_displacement=kinematics.initial_displacement,
         initial_velocity=kinematics.initial_velocity,
@@ -134,10 +196,10 @@ def cosines_of(time: np.ndarray) -> np.ndarray:
     return np.cos(np.outer(np.pi * time / time[-1], np.arange(DRIVEN_MODES + 1)))
 
 
-def _grid(sample_time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _grid(sample_time: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
     """Instants from time zero on, with every sample among them -> (g,) s, (n,) index of each sample."""
     stops = sample_time if sample_time[0] < 1e-9 else np.concatenate([[0.0], sample_time])
-    steps = np.maximum(np.ceil(np.diff(stops) / LONGEST_STEP - 1e-6).astype(int), 1)
+    steps = np.maximum(np.ceil(np.diff(stops) / longest - 1e-6).astype(int), 1)
     index = np.concatenate([[0], np.cumsum(steps)])
     within = np.arange(index[-1]) - np.repeat(index[:-1], steps)
     time = within * np.repeat(np.diff(stops) / steps, steps) + np.repeat(stops[:-1], steps)
@@ -165,6 +227,11 @@ def _signal(recording: Recording, name: str, grid: np.ndarray) -> Signal:
     noise = sensor_noise(bridged, recording.time_ns, rests)
     values = np.interp(grid, recording.time, bridged)
     return Signal(recording.time, bridged, values, *noise, noise.std / np.sqrt(count) if count else 0.0)
+
+
+def _offset_std(signal: Signal, output: Output) -> float:
+    """A displacement counts from anywhere: as much as it spreads."""
+    return float(np.std(signal.values)) if output.of_motion == 2 else signal.offset_std
 
 
 def _raw(recording: Recording, name: str, signal: Signal) -> np.ndarray:

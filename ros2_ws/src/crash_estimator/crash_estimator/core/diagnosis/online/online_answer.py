@@ -81,8 +81,8 @@ def curves(layout: Layout, record: ObservedRecord, predicted: np.ndarray, effect
     bodies = [layout.structure.bodies[output.body].name for output in layout.outputs]
     return FitCurves(
         effects,
-        tuple(o.channel if bodies.count(body) > 1 else body for o, body in zip(layout.outputs, bodies, strict=True)),
-        tuple("N" if output.fixed else "m/s^2" for output in layout.outputs),
+        tuple(o.channel if bodies.count(body) > 1 else body for o, body in zip(layout.outputs, bodies)),
+        tuple(output.unit for output in layout.outputs),
         np.round(record.time[record.at] * 1e9).astype(np.int64),
         record.measured,
         predicted,

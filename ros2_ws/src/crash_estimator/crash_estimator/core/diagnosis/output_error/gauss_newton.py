@@ -210,7 +210,7 @@ def fit(
         if circles >= CIRCLES or iteration >= most:
             break
     cost = step.after
-    if least is not None and not 0.0 <= cost <= least[1].before:
+    if least is not None and not 0.0 < cost <= least[1].before:
         # it went astray at a kink of the forces; or so far that nothing but rounding is left of the cost
         (point, _, normal), cost = least, least[1].before
     cost += normal.grown

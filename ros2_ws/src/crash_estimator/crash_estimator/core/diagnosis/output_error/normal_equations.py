@@ -101,13 +101,13 @@ def whitened(
     # what acts on outputs only is linearised at the forces' prediction: the measured motion itself is noisy
     weight = equations.sampling.weight
     position = {int(p): j + 1 for j, p in enumerate(equations.columns[: equations.linear.others - 1])}
-    for q, parameter, column in predicted(experiment, theta, equations.rows)[1]:
+    for q, parameter, column in predicted(experiment, theta, equations.rows, trajectory)[1]:
         out[:, q, position[parameter]] += binned(record, (weight[:, q] * column)[:, None])[:, 0]
     # along the trajectory: the free bodies' own acceleration less the observer's; fixed forces are in column 0
     along = np.where(layout.kind == FREE, trajectory.a, 0.0)
     if observer:
         along += np.where(layout.kind == FREE, observer.acceleration(trajectory), 0.0)
-    misfit = record.on_grid - predicted(experiment, theta, along)[0]
+    misfit = record.on_grid - predicted(experiment, theta, along, trajectory)[0]
     out[:, :, 0] = binned(record, weight * misfit) - out[:, :, 0]
     return record.whitener @ out if record.noise_is_inflated else out
 

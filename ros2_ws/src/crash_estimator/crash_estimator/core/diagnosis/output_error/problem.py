@@ -74,4 +74,5 @@ def embedding(base: Layout, wide: Layout) -> np.ndarray:
         found += [wide.offsets[r] + q for q in range(len(base.outputs))]
         for body in base.modes[r]:
             found += [wide.modes[r][body] + j for j in range(DRIVEN_MODES + 1)]
+        found += [wide.kicks[r][body] for body in base.kicks[r]]
     return np.array(found)

@@ -115,7 +115,7 @@ def propagate(system, sampling, out):
             if near >= 0:
                 for j in range(active):
                     memory[m, j] += by_crush[m, t] * (x[near, j] - x[far, j])
-        _sample(sampling, t, active, row, out)
+        _sample(sampling, t, active, row, v, x, out)
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", inline="always")
@@ -273,9 +273,9 @@ def _implicit(t, half, sixth, observer, ends, crush_ends, inverse_mass, kx, kv, 
 
 
 @njit(cache=True, fastmath=True, error_model="numpy", inline="always")
-def _sample(sampling, t, active, row, out):
+def _sample(sampling, t, active, row, v, x, out):
     """Add this instant's rows to the bins of the samples that see it, each output with its own lag."""
-    body, gain, lag, fraction, bins, weight = sampling
+    body, of_motion, gain, lag, fraction, bins, weight = sampling
     for q in range(len(body)):
         for part in range(2):
             share = fraction[q] if part else 1.0 - fraction[q]
@@ -286,5 +286,12 @@ def _sample(sampling, t, active, row, out):
                 continue  # that sample still shows an instant before the impact
             scale = share * gain[q] * weight[at, q]
             to, of = bins[at], body[q]
-            for j in range(min(active, out.shape[2])):
-                out[to, q, j] += scale * row[of, j]
+            if of_motion[q] == 0:
+                for j in range(min(active, out.shape[2])):
+                    out[to, q, j] += scale * row[of, j]
+            elif of_motion[q] == 1:
+                for j in range(min(active, out.shape[2])):
+                    out[to, q, j] += scale * v[of, j]
+            else:
+                for j in range(min(active, out.shape[2])):
+                    out[to, q, j] += scale * x[of, j]

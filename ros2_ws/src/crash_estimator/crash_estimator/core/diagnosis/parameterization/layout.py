@@ -11,7 +11,8 @@ import numpy as np
 
 from ...effects.effect import Addition
 from ...structure import Coefficient, Structure
-from ..observation.record import DRIVEN_MODES, ObservedRecord, outputs_of
+from ..observation.record import DRIVEN_MODES, ObservedRecord, comparable, outputs_of
+from ..observation.trajectory import Trajectory
 from .free_curve import ROUGHNESS, Curve, make_knots
 from .magnitudes import Magnitudes
 from .prior import Builder, Prior
@@ -19,6 +20,10 @@ from .terms import Link, Term
 
 FREE, DRIVEN, FIXED = 0, 1, 2
 """How a body moves: by forces, as its channels say, or not at all. The compiled passes know these codes."""
+
+
+START_ERRS = 0.3
+"""Of the velocity's standard deviation: a derivative at the end of a channel has half of the samples to go by."""
 
 
 class Layout(NamedTuple):
@@ -36,6 +41,7 @@ class Layout(NamedTuple):
     attached: dict[str, int]  # channel of an attached body -> its body
     offsets: tuple[int, ...]  # per record: first of its outputs' zero-offset errors
     modes: tuple[dict[int, int], ...]  # per record: driven body -> first of its modes
+    kicks: tuple[dict[int, int], ...]  # per record: body that starts as its own channel says -> error of its velocity
     prior: Prior
     start: np.ndarray  # (p,)
     names: tuple[str, ...]  # of the common parameters after the knots
@@ -98,16 +104,18 @@ def make_layout(
     terms += [_term(b, one, magnitudes) for one in additions if not any(one is other for other in placed)]
     terms.sort(key=lambda term: next(k for k, addition in enumerate(additions) if addition is term.addition))
     common = len(b.start)
-    outputs = outputs_of(structure)
-    offsets, modes = [], []
-    for record in records:
+    outputs = comparable(outputs_of(structure), structure, records)
+    offsets, modes, kicks = [], [], []
+    for r, record in enumerate(records):
         offsets.append(len(b.start))
         for q in range(len(outputs)):
             b.add("offset", 0.0, max(record.offset_std[q], 1e-9))
         modes.append(_modes(b, structure, record, attached))
+        kicks.append(_kicks(b, structure, magnitudes.measured[r]))
     return Layout(
         structure, tuple(links), tuple(bodies), np.array(kind), outputs, knots, common, len(b.start), tuple(terms),
-        attached, tuple(offsets), tuple(modes), b.prior(), np.array(b.start), tuple(b.names[knots:common]),
+        attached, tuple(offsets), tuple(modes), tuple(kicks), b.prior(), np.array(b.start),
+        tuple(b.names[knots:common]),
     )  # fmt: skip
 
 
@@ -166,7 +174,7 @@ def _term(b: Builder, addition: Addition, magnitudes: Magnitudes) -> Term:
     coefficient = b.add(f"{effect.name} {addition.target}", start, std, low=low, high=effect.high)
     shapes = {}
     for name, shape in effect.shapes.items():
-        unit = magnitudes.largest_crush(addition.target) if shape.of_crush else 1.0
+        unit = magnitudes.shape_unit(shape, addition.target)
         low, high = np.log(shape.low * unit), np.log(shape.high * unit)
         start = np.log(addition.shapes[name])
         shapes[name] = b.add(
@@ -192,4 +200,13 @@ def _modes(b: Builder, structure: Structure, record: ObservedRecord, attached: d
         b.add("mode", 0.0, max(np.hypot(offset, noise / np.sqrt(samples)), 1e-9))
         for _ in range(DRIVEN_MODES):
             b.add("mode", 0.0, max(noise * np.sqrt(2.0 / samples), 1e-9))
+    return found
+
+
+def _kicks(b: Builder, structure: Structure, measured: Trajectory) -> dict[int, int]:
+    """Errors of the velocities that bodies start with, where these are derivatives at the very end of a channel."""
+    found = {}
+    for k, body in enumerate(structure.bodies):
+        if body.derived:
+            found[k] = b.add("kick", 0.0, START_ERRS * float(np.std(measured.v[:, k])) or 1e-9)
     return found

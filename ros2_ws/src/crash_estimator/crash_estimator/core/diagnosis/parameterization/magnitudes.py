@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...effects.effect import Addition, ElementMotion
+from ...effects.effect import Addition, ElementMotion, Shape
 from ...structure import Element, Structure
 from ..observation.record import ObservedRecord, outputs_of
 from ..observation.trajectory import Trajectory, element_motion, integrate, measured_trajectory
@@ -38,6 +38,12 @@ class Magnitudes(NamedTuple):
 
     def largest_crush(self, element: str) -> float:
         return max(float(self.crush_range[self.element(element), 1]), 1e-4)
+
+    def shape_unit(self, shape: Shape, target: str) -> float:
+        """What a shape constant's limits and starts are shares of."""
+        if shape.of_crush:
+            return self.largest_crush(target)
+        return min(float(self.rate[self.element(target)]), 1.0) if shape.of_rate else 1.0
 
     def crushed_elements(self) -> list[Element]:
         """Elements that are crushed at all: of the others nothing can be told."""
@@ -109,9 +115,14 @@ def measure_magnitudes(
     body_force = np.full(len(structure.bodies), np.inf)
     for k, body in enumerate(structure.bodies):
         rows = [q for q, output in enumerate(outputs) if output.body == k]
-        if rows:
+        if body.motion_channel:
+            body_force[k] = body.mass * max(float(np.abs(motion.a[:, k]).max()) for motion in measured)
+        elif rows:
             inertia = body.mass if body.free else 1.0
             body_force[k] = inertia * max(_peak(record, rows) for record in records)
+        if body.applied:
+            pushed = max(float(np.abs(record.signals[body.applied].values).max()) for record in records)
+            body_force[k] = max(body_force[k], pushed) if rows else pushed
     elements = range(len(structure.elements))
     crush_range, rate = np.zeros((len(elements), 2)), np.full(len(elements), 1e-3)
     for k in elements:

@@ -18,7 +18,7 @@ def _addition(
 ) -> Addition:
     effect = checked(structure, spec, effects, magnitudes.records[0].test)
     shapes = {
-        name: shape.starts[len(shape.starts) // 2] * (magnitudes.largest_crush(spec.target) if shape.of_crush else 1.0)
+        name: shape.starts[len(shape.starts) // 2] * magnitudes.shape_unit(shape, spec.target)
         for name, shape in effect.shapes.items()
     } | dict(spec.shape)
     coefficient = spec.coefficient

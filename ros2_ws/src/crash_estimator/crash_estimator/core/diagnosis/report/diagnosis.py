@@ -6,15 +6,18 @@ from dataclasses import dataclass, replace
 
 from crash_replay.recording import Recording
 
+from ...derived_motion import with_accelerations
 from ...effects import EFFECTS
 from ...effects.effect import Effect
 from ...structure import ModelError, Structure
+from ..observation.pace import at_its_own_pace
 from ..observation.record import observe
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import free_run, noise_floor
 from ..residuals.score_test import Drift, drift_of
 from ..selection.assumptions import SelectionPath, first_believed, select
 from ..selection.fitted_model import Model
+from ..selection.thresholds import THRESHOLDS
 from ..selection.time_limit import out_of_time, time_limit
 from .left import Left, band_of, left_by
 from .model_effects import structure_with
@@ -88,8 +91,9 @@ def diagnose(
     """
     if not recordings:
         raise ModelError("a diagnosis needs at least one recording")
+    structure, recordings = with_accelerations(structure, recordings)
     with time_limit(seconds):
-        records = [observe(structure, recording) for recording in recordings]
+        records = [observe(structure, at_its_own_pace(structure, recording)) for recording in recordings]
         path = first_believed(select(structure, records, effects), records)
         stopped = out_of_time()
     found = _answer(structure, path, drift_of(path.as_recorded), tolerance)
@@ -112,7 +116,8 @@ def _answer(structure: Structure, path: SelectionPath, drift: Drift, tolerance: 
     pairs = zip(steps, models, models[1:], zip(runs, runs[1:], strict=False), strict=False)  # the last has no successor
     reports = tuple(step_of(*each, final) for each in pairs)[: len(added)]
     ranking, after = ranking_of(steps[0]), left_by(final, band)
-    weighed, certain = final.fit.problem.noise_is_inflated, all(abs(one.coefficient) > one.std for one in reports)
+    weighed = final.fit.problem.noise_is_inflated or after.share_explained(before) > THRESHOLDS.all_but_folds
+    certain = all(abs(one.coefficient) > one.std for one in reports)
     evidence = Evidence(len(added), final.white, drift, before, after, ranking, weighed, certain)
     verdict = verdict_on(evidence, tolerance)
     floor = noise_floor(first.fit.layout, first.records)

@@ -129,9 +129,8 @@ def _channels(
     for q, output in enumerate(layout.outputs):
         peak, size = float(np.abs(measured[:, q]).max()), float(np.sqrt(np.mean(left[:, q] ** 2)))
         if peak > HEARD * floor[q]:
-            unit = "N" if output.fixed else "m/s^2"
             rating = _rating(measured[:, q], measured[:, q] - left[:, q])
-            found.append(ChannelLeft(output.channel, recording, size, unit, size / peak, rating))
+            found.append(ChannelLeft(output.channel, recording, size, output.unit, size / peak, rating))
     return found
 
 

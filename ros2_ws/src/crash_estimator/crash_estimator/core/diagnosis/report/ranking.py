@@ -14,7 +14,7 @@ from ..parameterization.terms import Term
 from ..residuals.residuals import analyse, noise_floor
 from ..selection.candidate_fits import CandidateFit
 from ..selection.fitted_model import Model
-from ..selection.selection_step import SelectionStep, fit_stated
+from ..selection.selection_step import SelectionStep
 from ..selection.thresholds import THRESHOLDS
 
 ACTS = 0.05
@@ -135,10 +135,8 @@ def step_of(
 ) -> StepReport:
     """free_run_rms: of the two models' free runs; final: the model with all that was added."""
     best = step.candidates[0]
-    fitted = fit_stated(step, final)
-    value, std, shape = stated(fitted.layout.term(best.addition), fitted)
+    value, std, shape = stated(final.fit.layout.term(best.addition), final.fit)
     floor = noise_floor(before.fit.layout, before.records)
-    changed = after.fit if fitted is final.fit else fitted
     return StepReport(
         *best.addition.key, value, std, best.addition.effect.unit, float(best.gain),
         explained=float(np.clip(1.0 - after.residuals.mean_square / before.residuals.mean_square, 0.0, 1.0)),
@@ -147,7 +145,7 @@ def step_of(
             "before": before.residuals.rms, "after": after.residuals.rms, "noise_floor": floor, "unit": "m/s^2",
         },
         free_run_rms={"before": free_run_rms[0], "after": free_run_rms[1]},
-        force_explained=_force_explained(step.before.fit, changed),
+        force_explained=_force_explained(step.before.fit, after.fit),
     )  # fmt: skip
 
 

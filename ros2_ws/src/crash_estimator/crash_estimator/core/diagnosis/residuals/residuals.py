@@ -36,9 +36,8 @@ class Residuals(NamedTuple):
 
 
 def output_scale(layout: Layout) -> np.ndarray:
-    """(q,) from each output's unit to m/s^2: a force counts divided by the mass of all free bodies."""
-    mass = sum(body.mass for body in layout.structure.bodies if body.free) or 1.0
-    return np.array([1.0 / mass if output.fixed else 1.0 for output in layout.outputs])
+    """(q,) from each output's unit to m/s^2."""
+    return np.array([output.to_acceleration for output in layout.outputs])
 
 
 @may_diverge
@@ -61,7 +60,7 @@ def analyse(fitted: Fit, sharply: bool = False) -> Residuals:
     """
     problem = fitted.problem
     equations = _equations(problem, fitted.point)
-    found = _residuals(problem, fitted.theta, equations)
+    found = _residuals(problem, fitted.point, equations)
     if not sharply or not found.white or problem.noise_is_inflated:
         return found
     absorbed = [_absorbed(fitted, *each) for each in zip(problem.experiments, equations, strict=True)]
@@ -87,11 +86,12 @@ def _equations(problem: OutputErrorProblem, point: Point) -> list[Equations]:
     return [linearise(experiment, point.theta, trajectory) for experiment, trajectory in pairs]
 
 
-def _residuals(problem: OutputErrorProblem, theta: np.ndarray, equations: Sequence[Equations]) -> Residuals:
+def _residuals(problem: OutputErrorProblem, point: Point, equations: Sequence[Equations]) -> Residuals:
+    theta = point.theta
     outputs, residuals = [], []
-    for experiment, each in zip(problem.experiments, equations, strict=True):
+    for experiment, each, trajectory in zip(problem.experiments, equations, point.trajectories, strict=True):
         record = experiment.record
-        output = predicted(experiment, theta, each.rows)[0][record.at]
+        output = predicted(experiment, theta, each.rows, trajectory)[0][record.at]
         outputs.append(output)
         residuals.append(np.where(record.valid[record.at] > 0.0, record.measured - output, np.nan))
     links = tuple(each.links for each in equations)
@@ -111,4 +111,4 @@ def free_run(fitted: Fit) -> Residuals:
     theta = fitted.theta.copy()
     theta[problem.layout.common :] = 0.0
     run = simulate(problem, theta, fitted.trajectories)
-    return _residuals(problem, theta, _equations(problem, run))
+    return _residuals(problem, run, _equations(problem, run))

@@ -22,6 +22,7 @@ from scipy.special import chdtrc
 
 from ..mechanics.linearization import Equations, linearise
 from ..mechanics.outputs import predicted
+from ..observation.trajectory import Trajectory
 from ..output_error.gauss_newton import Fit, solve
 from ..output_error.normal_equations import Normal, may_diverge, whitened
 from ..parameterization.experiment import Experiment
@@ -110,7 +111,7 @@ def _normal_equations(fitted: Fit, free: Sequence[int]) -> Normal:
         equations = linearise(experiment, fitted.theta, trajectory)
         equations = _with_motion(equations, modes, free, layout.size)
         out = whitened(experiment, fitted.theta, trajectory, equations)
-        flat = np.concatenate([out, _of_sensors(experiment, fitted.theta, equations, modes)], axis=2)
+        flat = np.concatenate([out, _of_sensors(experiment, fitted.theta, trajectory, equations, modes)], axis=2)
         flat = flat.reshape(-1, flat.shape[-1])
         products = flat.T @ flat
         c = np.concatenate([equations.columns, size + np.arange(-len(layout.outputs) * MODES, 0)])
@@ -137,10 +138,12 @@ def _with_motion(equations: Equations, modes: np.ndarray, free: Sequence[int], f
     return equations._replace(linear=wider, columns=columns)
 
 
-def _of_sensors(experiment: Experiment, theta: np.ndarray, equations: Equations, modes: np.ndarray) -> np.ndarray:
+def _of_sensors(
+    experiment: Experiment, theta: np.ndarray, trajectory: Trajectory, equations: Equations, modes: np.ndarray
+) -> np.ndarray:
     """(bins, q, q MODES) whitened derivative of the outputs by their gains' modes."""
     record = experiment.record
-    shown = predicted(experiment, theta, equations.rows)[0]
+    shown = predicted(experiment, theta, equations.rows, trajectory)[0]
     q = shown.shape[1]
     found = np.zeros((record.bins, q, q, MODES))
     for n in range(q):

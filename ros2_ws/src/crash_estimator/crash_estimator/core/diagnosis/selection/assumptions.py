@@ -57,12 +57,14 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
 
 
 def first_believed(path: SelectionPath, records: Sequence[ObservedRecord]) -> SelectionPath:
-    """Up to as many additions as are believed together, where all of them leave more than noise: the first ones explain
-    most, and what came after them only goes on from there."""
+    """Up to as many additions as are believed together, where all of them leave more than noise, or where these leave
+    next to nothing: the first ones explain most, and what came after them only goes on from there."""
     most = THRESHOLDS.most_at_once
-    if path.final.white or len(path.final.additions) - path.present <= most:
+    if len(path.final.additions) - path.present <= most:
         return path
     final = path.steps[most].before
+    if path.final.white and share_removed(path.steps[0].before.residuals, final.residuals) < THRESHOLDS.all_but_folds:
+        return path
     return path._replace(steps=path.steps[: most + 1], final=final, as_recorded=in_the_sensors_noise(final, records))
 
 

@@ -63,19 +63,24 @@ def fit_candidates(
         search.from_motion(Screened(a, 0.0, 0.0, 1.0) for a in bend)
     if thorough and not model.white:
         gridded = [a for a in additions if a.effect.coefficient_grid()]
-        for harder in (
+        with_care = (
             search.slowly,
             search.other_variants,
             lambda: search.anew(SMALL_STEPS),
             lambda: search.from_motion(shortlist(by_motion, short) + shortlist(worth, short), SMALL_STEPS),
+        )
+        more_of_them = (
             lambda: search.from_model(shortlist(by_motion, short) + shortlist(worth, long)),
             lambda: search.from_motion(shortlist(worth, short) + shortlist(by_motion, long)),
             search.profile,
             lambda: search.from_motion([one for a in gridded for one in grid_starts(magnitudes, model, a)]),
             search.slowly,
             lambda: search.anew(LARGE_NOISE),
-        ):
+        )
+        for harder in (*with_care, *more_of_them):
             if out_of_time() or search.reached_the_floor():
+                break
+            if search.out_of_reach() and (harder in more_of_them or search.explains_most()):
                 break
             harder()
     return search.ranking()
@@ -185,6 +190,15 @@ class _Search:
         if best is None or best.fit is None or best.gain <= THRESHOLDS.gain:
             return False
         return analyse(best.fit, sharply=True).white
+
+    def explains_most(self) -> bool:
+        """The best so far takes a large share of the misfit away."""
+        return self.least < (1.0 - THRESHOLDS.named_share) * self.model.fit.cost
+
+    def out_of_reach(self) -> bool:
+        """What is left is so much more than noise that nothing makes noise of it."""
+        samples = sum(record.bins * record.measured.shape[1] for record in self.model.records)
+        return self.least > THRESHOLDS.real_structure * samples
 
     def ranking(self) -> list[CandidateFit]:
         """Fitted ones first: a screened gain is an estimate, and does not rank above a fit that has gained anything."""

@@ -29,12 +29,14 @@ class Thresholds(NamedTuple):
     near_floor: float = 2.0
     """Mean square below which a driven channel's error, or a finer curve, may be all that is missing."""
     real_structure: float = 100.0
-    """Mean square from which on no second effect is looked for at once: of a real structure none takes that."""
+    """Mean square from which on no second effect is looked for at once, nor a candidate fitted with more care: of a
+    real structure neither takes that."""
     least_share: float = 0.15
     """Of what the model before it leaves above the floor: an addition that removes less of it, and still leaves more
     than noise, is no explanation."""
     all_but_folds: float = 0.95
-    """Share that two of a kind must remove, where they leave more than noise: the rest may be folds of the curves."""
+    """Share that two of a kind must remove, where they leave more than noise: the rest may be folds of the curves. And
+    share from which the first effects are believed though more were added: what is left is of little weight."""
 
     # What is said, of what leaves more than noise
     most_at_once: int = 2

@@ -22,7 +22,8 @@ class ChannelError(Effect):
     balances_momentum: ClassVar[bool] = True
 
     def possible_targets(self, structure, test):
-        return [name for body in structure.bodies for name in (*body.acceleration, body.force) if name]
+        measured = [body for body in structure.bodies if not body.derived]
+        return [name for body in measured for name in (*body.acceleration, body.force) if name]
 
     def put_to_work(self, structure, test, spec):
         if spec.coefficient is not None:
@@ -42,7 +43,7 @@ class ChannelError(Effect):
         shown = []
         for body in (structure.bodies[k] for k in structure.equations):
             if body.free:
-                shown += body.acceleration
+                shown += () if body.derived else body.acceleration
             elif self.distorts != "offset":
                 shown.append(body.force)
         shown += [name for body in structure.bodies if body.driven for name in body.acceleration]

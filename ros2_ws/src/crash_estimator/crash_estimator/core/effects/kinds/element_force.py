@@ -54,7 +54,7 @@ class ElementForce(Effect):
 
 def on_element(effect: Effect, magnitudes, element: str):
     """One addition for each combination of the starts of its shape constants."""
-    largest, names = magnitudes.largest_crush(element), list(effect.shapes)
+    names = list(effect.shapes)
+    unit = [magnitudes.shape_unit(effect.shapes[name], element) for name in names]
     for values in product(*(effect.shapes[name].starts for name in names)):
-        unit = [largest if effect.shapes[name].of_crush else 1.0 for name in names]
         yield Addition(effect, element, {n: v * u for n, v, u in zip(names, values, unit, strict=True)})

@@ -37,7 +37,9 @@ def sensor_noise(values: np.ndarray, time_ns: np.ndarray, rests: bool) -> Noise:
     rest = float(np.std(before, ddof=1)) if rests and len(before) >= ENOUGH else np.nan
     rate = 1e9 / float(np.median(np.diff(time_ns)))
     busy = np.nan
-    if len(after) >= ENOUGH and (rate >= FAST or np.isnan(rest)):
+    if len(after) >= ENOUGH and rate < FAST and np.isnan(rest):
+        busy = _highest_frequencies(after)
+    elif len(after) >= ENOUGH and rate >= FAST:
         # median: jumps of the force are rare, and must not count as noise
         busy = float(np.median(np.abs(np.convolve(after, DIFFERENCE, "valid")))) / 0.6745
     if np.isnan(rest) or busy > AGREE * rest:
@@ -50,3 +52,11 @@ def sensor_noise(values: np.ndarray, time_ns: np.ndarray, rests: bool) -> Noise:
         count = n_rest + n_busy
     least = max(SMALLEST * float(np.abs(values).max(initial=0.0)), 1e-12)
     return Noise(max(float(found), least), max(float(count), 2.0))
+
+
+def _highest_frequencies(values: np.ndarray) -> float:
+    """Standard deviation of white noise whose power is that of the highest quarter of the frequencies: of a slow
+    recording a difference filter passes the motion itself. The median keeps lines of the motion's own out."""
+    power = np.abs(np.fft.rfft((values - values.mean()) * np.hanning(len(values)))) ** 2
+    highest = power[-(len(power) // 4) :]
+    return float(np.sqrt(np.median(highest) / np.log(2.0) / np.sum(np.hanning(len(values)) ** 2)))

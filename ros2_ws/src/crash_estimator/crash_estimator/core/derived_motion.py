@@ -1,0 +1,113 @@
+"""Accelerations of bodies that are observed by their displacement or velocity alone, found from the whole recording.
+
+The derivative is that of a local polynomial (Savitzky and Golay 1964), over the longest window that still follows the
+channel to within its noise. It looks ahead: nothing here serves a node that follows sample by sample.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import savgol_filter
+
+from crash_replay.recording import Channel, Recording
+
+from .structure import Body, Structure
+
+ORDER = 4
+"""Of the local polynomial: its second derivative is a parabola, as an acceleration between its inflections is."""
+WINDOWS = (5, 7, 11, 15, 21, 31, 43, 61, 85, 121)
+"""Samples, each about 1.4 times the one before."""
+FOLLOWS = 1.5
+"""What a window leaves, as a multiple of what white noise leaves of it: more, and it has cut the motion itself."""
+
+
+class Smoothed(NamedTuple):
+    """A channel (n,) and its derivatives by the time, in its unit per s and per s^2."""
+
+    value: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+
+
+def with_accelerations(
+    structure: Structure, recordings: Sequence[Recording]
+) -> tuple[Structure, tuple[Recording, ...]]:
+    """The same where every free body has an acceleration channel: a derived one where it is observed otherwise.
+
+    Where a test does not say how such a body starts, its own channel says it.
+    """
+    bodies = [body for body in structure.bodies if body.free and not body.acceleration and body.motion_channel]
+    if not bodies:
+        return structure, tuple(recordings)
+    names = {body.name: f"{body.motion_channel}_derived_acceleration" for body in bodies}
+    derived = [
+        replace(body, acceleration=(names[body.name],), derived=True) if body.name in names else body
+        for body in structure.bodies
+    ]
+    found = []
+    for recording in recordings:
+        for body in bodies:
+            recording = _with_acceleration(recording, body, names[body.name])
+        found.append(recording)
+    return replace(structure, bodies=tuple(derived)), tuple(found)
+
+
+def _with_acceleration(recording: Recording, body: Body, name: str) -> Recording:
+    test = recording.test
+    values = recording.column(body.motion_channel)
+    valid = np.isfinite(values)
+    bridged = np.interp(recording.time, recording.time[valid], values[valid]) if valid.any() else values
+    found = smoothed(bridged, recording.sample_period)
+    start = int(np.searchsorted(recording.time_ns, 0))
+    start = min(start, len(values) - 1)
+    velocity, acceleration = (found.first, found.second) if body.displacement else (found.value, found.first)
+    displacement = {body.name: float(found.value[start])} if body.displacement else {}
+    test = replace(
+        test,
+        channels=(
+            *test.channels,
+            Channel(name, "acceleration", body.name, source=f"derived from {body.motion_channel}"),
+        ),
+        initial_velocity={body.name: float(velocity[start])} | dict(test.initial_velocity),
+        initial_displacement=displacement | dict(test.initial_displacement),
+    )
+    acceleration = np.where(valid, acceleration, np.nan)
+    return replace(recording, test=test, values=np.column_stack([recording.values, acceleration]))
+
+
+def smoothed(values: np.ndarray, period: float) -> Smoothed:
+    """Of values (n,) on an even grid of `period` s."""
+    best = WINDOWS[0]
+    noise = _white_noise(values)
+    for window in WINDOWS:
+        if window > len(values):
+            break
+        kept = savgol_filter(values, window, ORDER)
+        share = 1.0 - savgol_filter(np.eye(1, window, window // 2)[0], window, ORDER)[window // 2]
+        if float(np.std(values - kept)) > FOLLOWS * noise * np.sqrt(share):
+            break
+        best = window
+    if len(values) < best:
+        nothing = np.full_like(values, np.nan)
+        return Smoothed(values, nothing, nothing)
+    return Smoothed(*(savgol_filter(values, best, ORDER, deriv=k, delta=period) for k in range(3)))
+
+
+def _white_noise(values: np.ndarray) -> float:
+    """Standard deviation of white noise in values, from their sixth difference, which is blind to what is slow."""
+    coefficients = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
+    found = np.convolve(values, coefficients / np.linalg.norm(coefficients), "valid")
+    return float(np.median(np.abs(found))) / 0.6745 if len(found) else 0.0
+
+
+def between_samples(time: np.ndarray, values: np.ndarray) -> CubicSpline:
+    """A measured force (n,) as a function of the time in s: what oscillates with few samples a period keeps its size.
+
+    A straight line between samples would take 4 % off what has nine of them a period.
+    """
+    valid = np.isfinite(values)
+    offset = values[valid & (time < 0.0)].mean() if (valid & (time < 0.0)).any() else 0.0
+    return CubicSpline(time[valid], values[valid] - offset)
