@@ -6,17 +6,15 @@ They do not come with the project: --data names the folder that has them.
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import process_time
-from typing import NamedTuple
 
 from crash_replay.conditioning import filter_recording
 from crash_replay.fault import guarded
 from crash_replay.gravity import G
 from crash_replay.readers import read_source
-from crash_replay.recording import Recording, RecordingError
+from crash_replay.recording import RecordingError
 from crash_replay.said import Parser, say
 
 from ..core.diagnosis import EFFECT_MISSING, Diagnosis, diagnose
@@ -24,7 +22,7 @@ from ..core.structure import ModelError, Structure
 from ..figures import markdown_table, write_markdown
 from ..model_file import load_model
 from .effects_results import ONE_THREAD
-from .outside_systems import other_systems
+from .outside_systems import Case, other_systems
 
 HEAD = """# Recordings that nobody here made
 
@@ -44,15 +42,6 @@ ENGINE = 400.0
 """kg, as the thesis has it for such a car."""
 WITHIN_OF_DAMPER, WITHIN_OF_ENGINE = 0.1, 0.25
 """Shares of the true value that count as right."""
-
-
-class Case(NamedTuple):
-    name: str
-    recordings: Callable[[], list[Recording]]
-    model: str  # a ready one, or a model file's text
-    truth: str
-    right: Callable[[Diagnosis], bool]
-    besides: Callable[[Diagnosis], str] = lambda found: ""  # what else is told of it
 
 
 def cases(data: Path) -> Iterator[Case]:
@@ -83,15 +72,6 @@ def _impactor(files: tuple[Path, ...]) -> Case:
     return Case(name, read, "impactor_spring", f"a damper of {damping:.3g} N s/m", lambda f: _is_damper(f, damping))
 
 
-def model_of(model: str) -> Structure:
-    if "\n" not in model:
-        return load_model(model)
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "model.yaml"
-        path.write_text(model, encoding="utf-8")
-        return load_model(path)
-
-
 def _named(found: Diagnosis, effect: str) -> list[float]:
     """Its coefficients, where it is named at all."""
     steps = found.steps if found.verdict == EFFECT_MISSING else ()
@@ -109,7 +89,7 @@ def _is_engine(found: Diagnosis) -> bool:
 
 def judged(case: Case) -> list[str]:
     """Its row of the table."""
-    recordings, model = case.recordings(), model_of(case.model)
+    recordings, model = case.recordings(), case.model if isinstance(case.model, Structure) else load_model(case.model)
     began = process_time()
     try:
         found = diagnose(model, recordings)

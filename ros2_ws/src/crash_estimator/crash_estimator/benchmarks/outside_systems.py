@@ -1,45 +1,43 @@
 """Other people's systems for `outside`: a free body that a measured force pushes, observed by its displacement."""
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.io import loadmat
 
 from crash_replay.recording import Channel, Recording, Test
 
-from ..core.derived_motion import with_accelerations
-from ..core.diagnosis import EFFECT_MISSING, Diagnosis
-from ..core.diagnosis.observation.record import observe
-from ..core.diagnosis.output_error.problem import make_problem
-from ..core.diagnosis.output_error.simulation import simulate
-from ..core.diagnosis.parameterization.magnitudes import measure_magnitudes
-from ..core.diagnosis.selection.assumptions import CELLS
-from ..core.structure import Structure
+from ..core.diagnosis import EFFECT_MISSING, Diagnosis, predict
+from ..core.structure import Body, Coefficient, Element, Structure
 
-AXIS = """
-name: axis
-bodies:
-  axis: {mass: 95.1, applied: motor_fx, displacement: axis_x}
-  frame: {fixed: true}
-elements:
-  guide: {between: [axis, frame], stiffness: 0.0, damping: {estimate: true, initial: 100.0, min: 0.0}}
-"""
+
+class Case(NamedTuple):
+    """One diagnosis, and what is true."""
+
+    name: str
+    recordings: Callable[[], list[Recording]]
+    model: Structure | str  # or a ready one's name
+    truth: str
+    right: Callable[[Diagnosis], bool]
+    besides: Callable[[Diagnosis], str] = lambda found: ""  # what else is told of it
+
+
+DAMPER = Coefficient(1e-3, estimated=True, min=0.0)
+AXIS = Structure(
+    "axis",
+    (Body("axis", mass=95.1, applied="motor_fx", displacement="axis_x"), Body("frame", fixed=True)),
+    (Element("guide", ("axis", "frame"), Coefficient(0.0), DAMPER),),
+)
 FRICTION, WITHIN_OF_FRICTION = 20.39, 0.05
 """N, of the axis (Janot, Gautier, Brunot 2019), and the share of it that counts as right."""
 
-OSCILLATOR = """
-name: oscillator
-bodies:
-  mass: {mass: 5.377e-6, applied: drive_fx, displacement: mass_x}
-  ground: {fixed: true}
-elements:
-  spring:
-    between: [mass, ground]
-    stiffness: {estimate: true, initial: 1.0, shape: constant}
-    damping: {estimate: true, initial: 1.0e-3, min: 0.0}
-"""
+OSCILLATOR = Structure(
+    "oscillator",
+    (Body("mass", mass=5.377e-6, applied="drive_fx", displacement="mass_x"), Body("ground", fixed=True)),
+    (Element("spring", ("mass", "ground"), Coefficient(1.0, estimated=True, shape="constant"), DAMPER),),
+)
 """An electronic circuit: volts stand for N and m. Its mass is that of the frequency response of samples 2000 to 10 192,
 where it moves little."""
 SAMPLING, TRAINED, TESTED = 610.35, slice(52_000, 60_192), slice(118_000, 126_192)
@@ -52,8 +50,6 @@ LARGEST_ERROR = 1.1e-3
 
 def other_systems(folder: Path) -> Iterator:
     """Of what the folder has."""
-    from .outside import Case
-
     axis, oscillator = folder / "emps" / "DATA_EMPS.mat", folder / "silverbox" / "SNLS80mV.csv"
     if axis.exists():
         truth = f"dry friction of {FRICTION} N, then a constant force"
@@ -100,18 +96,4 @@ def _is_cubic(found: Diagnosis, tested: Recording) -> bool:
 
 def free_run_error(found: Diagnosis, recording: Recording) -> float:
     """RMS error of what was found, simulated under the force of another recording of the same system."""
-    fitted = found.models[-1].fit
-    structure = fitted.layout.structure
-    record = observe(structure, with_accelerations(_as_given(structure), [recording])[1][0])
-    additions = [term.addition for term in fitted.layout.terms]
-    problem = make_problem(measure_magnitudes(structure, [record], CELLS), [record], additions)
-    theta = problem.layout.start.copy()
-    theta[: problem.layout.common] = fitted.theta[: fitted.layout.common]
-    motion = simulate(problem, theta, problem.measured(theta).trajectories).trajectories[0]
-    error = record.measured[:, 0] - motion.x[record.at, 0] - fitted.theta[fitted.layout.offsets[0]]
-    return float(np.sqrt(np.mean(error[record.time[record.at] > RUNG_OUT] ** 2)))
-
-
-def _as_given(structure: Structure) -> Structure:
-    bodies = (replace(b, acceleration=(), derived=False) if b.derived else b for b in structure.bodies)
-    return replace(structure, bodies=tuple(bodies))
+    return float(predict(found, recording).error(RUNG_OUT)[0])

@@ -8,6 +8,7 @@ residuals, selection, report, online.
 from .online.candidate_turns import OnlineState
 from .online.online_answer import FitCurves, OnlineAnswer, final_answer
 from .online.online_diagnosis import OnlineDiagnosis
+from .report.another_recording import Predicted, predict
 from .report.diagnosis import Diagnosis, diagnose
 from .report.ranking import Ranked, StepReport
 from .report.tolerance import DEFAULT, Tolerance, tolerance_of
@@ -18,6 +19,6 @@ from .selection.thresholds import THRESHOLDS
 
 __all__ = [
     "ADEQUATE", "DEFAULT", "EFFECT_MISSING", "THRESHOLDS", "UNEXPLAINED", "Diagnosis", "FitCurves", "MisfitWindow",
-    "Model", "OnlineAnswer", "OnlineDiagnosis", "OnlineState", "Ranked", "StepReport", "Tolerance", "diagnose",
-    "final_answer", "tolerance_of",
+    "Model", "OnlineAnswer", "OnlineDiagnosis", "OnlineState", "Predicted", "Ranked", "StepReport", "Tolerance",
+    "diagnose", "final_answer", "predict", "tolerance_of",
 ]  # fmt: skip

@@ -17,6 +17,7 @@ from ..residuals.residuals import free_run, noise_floor
 from ..residuals.score_test import Drift, drift_of
 from ..selection.assumptions import SelectionPath, first_believed, select
 from ..selection.fitted_model import Model
+from ..selection.selection_step import fit_of_all
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_limit import out_of_time, time_limit
 from .left import Left, band_of, left_by
@@ -114,7 +115,8 @@ def _answer(structure: Structure, path: SelectionPath, drift: Drift, tolerance: 
     added = final.additions[present:]
     runs = [free_run(model.fit).rms for model in models]
     pairs = zip(steps, models, models[1:], zip(runs, runs[1:], strict=False), strict=False)  # the last has no successor
-    reports = tuple(step_of(*each, final) for each in pairs)[: len(added)]
+    of_all = fit_of_all(steps[: len(added)], final)
+    reports = tuple(step_of(*each, of_all) for each in list(pairs)[: len(added)])
     ranking, after = ranking_of(steps[0]), left_by(final, band)
     weighed = final.fit.problem.noise_is_inflated or after.share_explained(before) > THRESHOLDS.all_but_folds
     certain = all(abs(one.coefficient) > one.std for one in reports)

@@ -131,11 +131,11 @@ def _confounded(one: CandidateFit, other: CandidateFit) -> bool:
 
 
 def step_of(
-    step: SelectionStep, before: Model, after: Model, free_run_rms: tuple[float, float], final: Model
+    step: SelectionStep, before: Model, after: Model, free_run_rms: tuple[float, float], of_all: Fit
 ) -> StepReport:
-    """free_run_rms: of the two models' free runs; final: the model with all that was added."""
+    """free_run_rms: of the two models' free runs; of_all: the fit with all that was added."""
     best = step.candidates[0]
-    value, std, shape = stated(final.fit.layout.term(best.addition), final.fit)
+    value, std, shape = stated(of_all.layout.term(best.addition), of_all)
     floor = noise_floor(before.fit.layout, before.records)
     return StepReport(
         *best.addition.key, value, std, best.addition.effect.unit, float(best.gain),
