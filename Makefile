@@ -1,4 +1,4 @@
-.PHONY: help demo test bags thesis benchmark benchmark-effects benchmark-outside chaos endurance fuzz clean
+.PHONY: help demo lint check test bags thesis benchmark benchmark-effects benchmark-outside chaos endurance fuzz clean
 
 help: # what there is to make
 	@sed -n 's/^\([a-z-]*\):.*# /make \1	/p' Makefile
@@ -10,9 +10,22 @@ demo: # a crash replayed, what its model lacks named, added and shown in Rerun; 
 # Without autoload: the plugins of an installed ROS 2 are written for an older pytest.
 PYTEST = PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 tools/env python -m pytest -p _hypothesis_pytestplugin -p xdist.plugin
 
+lint: # style and types: ruff and mypy with the settings of pyproject.toml
+	@tools/env python -m ruff check --quiet .
+	@tools/env python -m ruff format --check --quiet .
+	@tools/env python -m mypy
+
+# What `check` looks at: of these folders the files that start nothing, and of the core some that hardly simulate, which
+# is what takes the time elsewhere.
+CHECKED = $(patsubst %,tests/core/test_%.py,discretize effects estimators factors model_file motion_and_contact rating) \
+	tests/replay tests/viewer tests/nodes tests/commands/test_demo_story.py \
+	tests/commands/test_diagnose_command.py tests/project/test_architecture.py tests/project/test_package_xml.py
+
 # A file's tests are run by one of two processes; -n 0 in PYTEST_ARGS: all by one. What is compiled is so once, before.
-test: # all tests; some of them with PYTEST_ARGS="-k name"
-	@tools/setup
+check: lint # for every save: style, types, and the tests that need no ROS graph, no other process and little time
+	@$(PYTEST) -n 2 --dist loadfile -q --no-graph $(CHECKED)
+
+test: lint # all tests, style and types first; some of them with PYTEST_ARGS="-k name"
 	@tools/screenshot-libs
 	@tools/env python -m crash_estimator.warm_up
 	@$(PYTEST) -n 2 --dist loadfile $(PYTEST_ARGS)

@@ -3,6 +3,7 @@
 The imports are in the fixtures: what needs neither ROS nor the viewer does not wait for them.
 """
 
+import re
 import signal
 
 import pytest
@@ -16,6 +17,22 @@ settings.load_profile("no_deadline")
 for ending in (signal.SIGINT, signal.SIGHUP):
     if signal.getsignal(ending) is signal.SIG_IGN:
         signal.signal(ending, signal.default_int_handler if ending is signal.SIGINT else signal.SIG_DFL)
+
+
+NEEDS_A_GRAPH = re.compile(
+    r"\b(rclpy|crash_msgs|subprocess|stage)\b|helpers_(demo|diagnosis|domain|estimator_node|nodes|other_process|record|replay|waiting)"
+)
+"""What a file of tests mentions that starts nodes or other processes."""
+
+
+def pytest_addoption(parser):
+    parser.addoption("--no-graph", action="store_true", help="leave out the files that start nodes or processes")
+
+
+def pytest_ignore_collect(collection_path, config):
+    if config.getoption("--no-graph") and collection_path.suffix == ".py":
+        return True if NEEDS_A_GRAPH.search(collection_path.read_text()) else None
+    return None
 
 
 @pytest.fixture

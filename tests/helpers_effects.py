@@ -46,7 +46,10 @@ def last_of(structure, recording: Recording, method: str = "constrained_kalman",
     """-> name -> (value, std, status) after the last sample."""
     estimator = make_estimator(structure, recording.test, method, **settings)
     last = run(estimator, recording.samples())[-1]
-    return {n: found for n, *found in zip(estimator.description.parameters, last.parameters, last.std, last.status)}
+    return {
+        n: found
+        for n, *found in zip(estimator.description.parameters, last.parameters, last.std, last.status, strict=True)
+    }
 
 
 def parameter_of(effect: str, target: str) -> str:

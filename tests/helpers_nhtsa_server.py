@@ -4,11 +4,13 @@ import json
 import re
 import time
 import zipfile
+from collections.abc import Mapping
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from io import BytesIO
 from pathlib import Path
 from threading import Thread
+from types import MappingProxyType
 
 from crash_replay.nhtsa_database.curve_by_curve import DETAILS, INSTRUMENTATION, TEST
 from crash_replay.nhtsa_database.polite_client import PoliteClient
@@ -68,20 +70,20 @@ def enveloped(results) -> bytes:
 def rows_of(folder: Path, number: int) -> list[dict[str, str]]:
     lines = (folder / f"v{number:05d}.EV5").read_text(encoding="latin-1").splitlines()
     start = next(k for k, line in enumerate(lines) if "INSTRUMENTATION" in line)
-    return [dict(zip(INSTRUMENTATION, line.split("|"))) for line in lines[start + 1 :] if "|" in line]
+    return [dict(zip(INSTRUMENTATION, line.split("|"), strict=True)) for line in lines[start + 1 :] if "|" in line]
 
 
 def metadata_of(folder: Path, number: int) -> dict:
     """Numbers as text, as they come."""
     lines = (folder / f"v{number:05d}.EV5").read_text(encoding="latin-1").splitlines()
-    test = dict(zip(TEST, lines[3].split("|")[1:]))
+    test = dict(zip(TEST, lines[3].split("|")[1:], strict=False))
     vehicles = [line.split("|") for line in lines[5 : lines.index("----- INSTRUMENTATION -----")]]
     vehicles = [{"VEHNO": fields[0], "VEHTWT": fields[10], "VEHSPD": "N/A"} for fields in vehicles]
     return {"TEST": [test], "VEHICLE": vehicles, "BARRIER": None, "OCCUPANT": None, "RESTRAINT": None,
             "INSTRUMENTATION": rows_of(folder, number), "URL": "wrong", "REPORTS": None}  # fmt: skip
 
 
-def packed(folder: Path, more: dict[str, bytes] = {}, inside: str = "ev5/") -> bytes:
+def packed(folder: Path, more: Mapping[str, bytes] = MappingProxyType({}), inside: str = "ev5/") -> bytes:
     file = BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in sorted(folder.iterdir()):

@@ -19,8 +19,8 @@ FETCHED = {"nhtsa:10146": DATA / "nhtsa-10146"}
 
 
 def environment() -> dict[str, str]:
-    """Of a new user without a display, on a ROS domain of the test's own, to whom the tests of NHTSA's database that the
-    README names have come already."""
+    """Of a new user without a display, on a ROS domain of the test's own, to whom the tests of NHTSA's database that
+    the README names have come already."""
     cache = ROOT / "out" / "cache"
     for source, folder in FETCHED.items():
         place = cache / f"v{source.removeprefix('nhtsa:')}"

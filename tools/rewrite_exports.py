@@ -18,7 +18,7 @@ REPLACEMENTS = {
 
 def rewrite(text: str) -> str:
     for pattern, folder in REPLACEMENTS.items():
-        text = re.sub(pattern, lambda _: folder, text)
+        text = re.sub(pattern, lambda _, folder=folder: folder, text)
     return text
 
 

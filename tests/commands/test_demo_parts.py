@@ -15,7 +15,7 @@ from crash_estimator.demo.choice import Choice, as_bag, choose, default_rate, mo
 from crash_estimator.demo.domain import DOMAINS, free_domain, own_environment
 from crash_estimator.demo.folder import claim
 from crash_estimator.demo.terminal import Terminal, bar
-from crash_estimator.model_file import ready_models
+from crash_estimator.ready_models import ready_models
 from crash_replay.bag import read_bag
 from crash_replay.recording import RecordingError
 

@@ -83,7 +83,8 @@ def test_the_replay_takes_them_too(forms):
 
 @pytest.mark.parametrize(
     "unit, largest, shown",
-    [("N", 640e3, "kN"), ("N", 12.0, "N"), ("m", 0.7, "mm"), ("m", 1.3, "m"), ("N/m", 1.5e4, "kN/m"), ("N/m", 50, "N/m"),
+    [("N", 640e3, "kN"), ("N", 12.0, "N"), ("m", 0.7, "mm"), ("m", 1.3, "m"), ("N/m", 1.5e4, "kN/m"), ("N/m", 50,
+    "N/m"),
      ("kg", 3.0, "kg"), ("m/s^2", 300.0, "g")],
 )  # fmt: skip
 def test_units_suit_the_size(unit, largest, shown):

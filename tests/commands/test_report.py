@@ -119,7 +119,8 @@ def test_the_first_sentence_says_what_matters_first():
     step = SimpleNamespace(effect="coulomb_friction", target="rib_spine", coefficient=1413.2, std=6.1, unit="N")
     missing = SimpleNamespace(verdict="effect_missing", residual_rms=rms, steps=(step,), complete=True)
     assert first_sentence(missing, "dummy", "T1") == (
-        "Model dummy lacks coulomb friction on rib_spine (1413 ± 6.1 N): with it the error on test T1 falls from 4.18 g to "
+        "Model dummy lacks coulomb friction on rib_spine (1413 ± 6.1 N): with it the error on test T1 falls from "
+        "4.18 g to "
         "1.01 g RMS; the sensors' noise is 0.989 g."
     )
     right = SimpleNamespace(

@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 from rclpy.serialization import deserialize_message
 
 from crash_estimator.cli.common import write_json
-from crash_estimator.cli.estimate import as_json
+from crash_estimator.cli.work.estimate import as_json
 from crash_estimator.core.errors import equation_errors
 from crash_estimator.core.estimate import ParameterStatus
 from crash_estimator.core.fold import run
@@ -84,7 +84,7 @@ def test_json_and_table_have_it(found, tmp_path):
     content = json.loads((tmp_path / "found.json").read_text())
     assert tuple(content["besides"]) == tuple(content["series"]["besides"]) == description.extra
     table = besides_table(description, estimates[-1])
-    for name, unit in zip(description.extra, description.extra_units):
+    for name, unit in zip(description.extra, description.extra_units, strict=True):
         assert content["besides"][name]["unit"] == content["units"][name] == unit
         assert len(content["series"]["besides"][name]) == len(recording)
         assert name in table or np.isnan(estimates[-1].extra[description.extra.index(name)])

@@ -95,7 +95,9 @@ def test_a_plan_comes_back_from_its_two_arrays(method):
     whole, others = flat(estimator.size, settings, estimator.plan)
     assert size_of(whole) == estimator.size
     assert_array_equal(method_of(others), settings)
-    for name, found, given in zip(estimator.plan._fields, plan_views(whole, others, estimator.size), estimator.plan):
+    for name, found, given in zip(
+        estimator.plan._fields, plan_views(whole, others, estimator.size), estimator.plan, strict=True
+    ):
         assert_array_equal(found, given, err_msg=name)
 
 

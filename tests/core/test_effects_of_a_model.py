@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from ruamel.yaml import YAML
 
 from crash_estimator.cli import estimate, report, simulate
-from crash_estimator.cli.diagnose import _entry
+from crash_estimator.cli.work.diagnose import _entry
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.effects.base import ElementForce
 from crash_estimator.core.effects.change import add_effect, remove_effect

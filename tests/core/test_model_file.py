@@ -3,7 +3,8 @@
 import pytest
 
 from crash_estimator.core.structure import ModelError
-from crash_estimator.model_file import load_model, ready_models
+from crash_estimator.model_file import load_model
+from crash_estimator.ready_models import ready_models
 from crash_replay.recording import RecordingError
 
 GOOD = """\

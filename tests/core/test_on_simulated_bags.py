@@ -56,7 +56,7 @@ def test_peak_forces_are_within_five_percent(name):
 def test_the_dummy_s_stiffness_lies_within_three_sigma(name):
     structure, description, estimates, truth = followed(name, "constrained_kalman")
     after = np.array([estimate.time_ns >= 0 for estimate in estimates])
-    for k, element in enumerate(structure.elements):
+    for element in structure.elements:
         known = truth.elements[element.name]
         loaded = after & (known.state == "loading") & (known.crush > 0.010)
         p = description.parameters.index(f"{element.name}.stiffness")
@@ -76,6 +76,6 @@ def test_mrls_follows_abrupt_changes_closer_than_rls():
         variances[method] = [row.error_variance for row in equation_errors(description, estimates)]
     noises = [truth.channels[name].noise ** 2 for name in ("car_ax", "engine_ax", "barrier_fx")]
     print("\nerror variance over noise variance, frontal_abrupt\nequation      RLS     MRLS")
-    for name, rls, mrls, noise in zip(description.equations, variances["rls"], variances["mrls"], noises):
+    for name, rls, mrls, noise in zip(description.equations, variances["rls"], variances["mrls"], noises, strict=True):
         print(f"{name:8s} {rls / noise:8.2f} {mrls / noise:8.2f}")
-    assert sum(m < r for m, r in zip(variances["mrls"], variances["rls"])) >= 2
+    assert sum(m < r for m, r in zip(variances["mrls"], variances["rls"], strict=True)) >= 2

@@ -18,7 +18,7 @@ from crash_estimator.core.validation import (
     validate,
 )
 from crash_estimator.model_file import load_model
-from crash_estimator.validation_tables import comparison_table, covariance_table, whiteness_table
+from crash_estimator.validation_tables import comparison_table, correlation_table, covariance_table
 from crash_replay.synthetic.recordings import SCENARIOS
 
 BOTH = dict(
@@ -37,9 +37,9 @@ def test_correlations_are_those_of_their_definition():
     r, u = random.standard_normal(50), random.standard_normal(50)
     r, u = r - r.mean(), u - u.mean()
     auto, cross = autocorrelation(r, 5), cross_correlation(r, u, 5)
-    for lag, value in zip(auto.lags, auto.values):
+    for lag, value in zip(auto.lags, auto.values, strict=True):
         assert_allclose(value, np.sum(r[lag:] * r[: 50 - lag]) / np.sum(r * r), atol=1e-12)
-    for lag, value in zip(cross.lags, cross.values):
+    for lag, value in zip(cross.lags, cross.values, strict=True):
         later, earlier = (r[lag:], u[: 50 - lag]) if lag >= 0 else (r[:lag], u[-lag:])
         assert_allclose(value, np.sum(later * earlier) / np.sqrt(np.sum(r * r) * np.sum(u * u)), atol=1e-12)
 
@@ -73,11 +73,11 @@ def test_the_residual_of_the_true_model_is_white_and_that_of_a_poorer_one_goes_a
     whole = oscillator(**BOTH)
     description, estimates = estimated(whole, recording, noise_memory=0)
     good = validate(whole, description, estimates, what="innovation", start=0.005).equations[0]
-    assert good.white(0.99) and good.auto.inside(0.99) > 0.9
+    assert good.uncorrelated(0.99) and good.auto.inside(0.99) > 0.9
     poor = oscillator(Coefficient(2.0e4, True, std=1.0, drift=0.0))  # known so well that it cannot take up the damping
     description, estimates = estimated(poor, recording, noise_memory=0, offsets=False)
     bad = validate(poor, description, estimates, what="innovation", start=0.005).equations[0]
-    assert not bad.white(0.99)
+    assert not bad.uncorrelated(0.99)
     assert np.abs(bad.cross["spring.rate"].values).max() > 0.9 > np.abs(bad.cross["spring.crush"].values).max()
 
 
@@ -93,7 +93,7 @@ def test_the_covariance_is_that_of_the_errors_and_tables_show_it():
     assert set(validation.equations[0].cross) == {
         f"{element}.{kind}" for element in ("cab_barrier", "cab_engine") for kind in ("crush", "rate")
     }
-    for text in (whiteness_table(validation), covariance_table(validation)):
+    for text in (correlation_table(validation), covariance_table(validation)):
         assert len({len(line) for line in text.splitlines() if not line.startswith("(")}) <= 2
         for name in ("cab", "engine", "barrier"):
             assert name in text
@@ -103,7 +103,7 @@ def test_too_few_samples_are_said_to_be_too_few():
     recording = oscillator_recording(n=12)
     description, estimates = estimated(oscillator(**BOTH), recording)
     equation = validate(oscillator(**BOTH), description, estimates).equations[0]
-    assert equation.auto is None and not equation.white(0.95)
+    assert equation.auto is None and not equation.uncorrelated(0.95)
 
 
 def test_a_free_run_of_the_true_model_is_the_measurement():

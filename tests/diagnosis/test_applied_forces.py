@@ -155,7 +155,9 @@ def test_the_derivatives_of_motion_outputs_are_their_finite_differences(model, o
     record = shaken(0.0, until=1.0)
     if "mass_v" in observed:
         v = np.gradient(record.column("mass_x"), record.time)
-        record = recording("shaken", record.time, mass_v=("velocity", v), shaker_fx=("force", record.column("shaker_fx")))
+        record = recording(
+            "shaken", record.time, mass_v=("velocity", v), shaker_fx=("force", record.column("shaker_fx"))
+        )
     structure, (record,) = with_accelerations(model(OSCILLATOR.replace("displacement: mass_x", observed)), [record])
     observed_record = observe(structure, record)
     problem = make_problem(measure_magnitudes(structure, [observed_record], 12), [observed_record], ())

@@ -14,7 +14,8 @@ from crash_estimator.cli import diagnose as command
 from crash_estimator.cli import estimate
 from crash_estimator.core.diagnosis.report.diagnosis import Diagnosis, diagnose
 from crash_estimator.diagnosis_doubt import doubt
-from crash_estimator.model_file import load_model, model_path
+from crash_estimator.model_file import load_model
+from crash_estimator.ready_models import model_path
 from crash_replay.bag import read_bag
 
 HIDDEN = str(BAGS / "hidden_effect.model.yaml")

@@ -23,8 +23,9 @@ from crash_estimator.core.diagnosis.selection.score_screening import Screened
 from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.kept import Kept, Rows
+from crash_estimator.nodes.diagnosis_answerer import Answerer
 from crash_estimator.nodes.diagnosis_story import Told, story
-from crash_estimator.nodes.diagnosis_worker import Answerer, Task
+from crash_estimator.nodes.diagnosis_worker import Task
 from crash_replay.recording import Recording, RecordingError
 
 EVERY = 0.005
@@ -97,7 +98,7 @@ def test_the_error_is_that_of_all_samples_and_falls_to_the_noise_with_what_was_f
 
 def test_misfit_and_curves_are_of_the_samples_so_far(damped, said):
     recording = damped[2]
-    for answer, end in zip(said[-3:], np.arange(EVERY, recording.time[-1] + EVERY, EVERY)[-3:]):
+    for answer, end in zip(said[-3:], np.arange(EVERY, recording.time[-1] + EVERY, EVERY)[-3:], strict=True):
         seen = so_far(recording, end)
         after = seen.time_ns >= 0
         for curves in answer.fits:

@@ -1,4 +1,5 @@
-"""The diagnosis against what owes it nothing: finite differences, scipy's solvers, and the free run of the estimators."""
+"""The diagnosis against what owes it nothing: finite differences, scipy's solvers, and the free run of the
+estimators."""
 
 from dataclasses import replace
 

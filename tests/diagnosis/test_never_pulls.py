@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from crash_estimator.cli.diagnose import apply
+from crash_estimator.cli.work.diagnose import apply
 from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 from crash_estimator.core.diagnosis.report.diagnosis import diagnose

@@ -119,7 +119,7 @@ def the_first(node: Connection, setup) -> None:
 @pytest.mark.parametrize("says", [nothing, half_a_message, the_first])
 def test_a_node_that_is_killed_leaves_no_traceback(says, damped):
     node, its = Pipe()
-    command = f"from crash_estimator.nodes.diagnosis_worker import main; main({its.fileno()})"
+    command = f"from crash_estimator.nodes.diagnosis_answerer import main; main({its.fileno()})"
     process = subprocess.Popen([sys.executable, "-c", command], pass_fds=[its.fileno()], stderr=subprocess.PIPE)
     its.close()
     says(node, (damped[1], "", ()))

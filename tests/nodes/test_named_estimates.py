@@ -53,9 +53,7 @@ def listen(stage: Stage, name: str) -> dict[str, list]:
 )
 @pytest.mark.parametrize("block", [1, 7])
 def test_they_are_those_of_the_blocks_to_the_last_bit(stage, model, recording, method, settings, block):
-    node = stage.add_estimator(
-        "one", model=model, method=method, value_topics=["spring.stiffness"], **settings
-    )
+    node = stage.add_estimator("one", model=model, method=method, value_topics=["spring.stiffness"], **settings)
     stage.send_test(recording)
     stage.spin_until(lambda: node.follower, "the test has come")
     named = listen(stage, "one")

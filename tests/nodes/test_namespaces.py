@@ -113,7 +113,11 @@ def of_estimator(file: Path, sled: Sled) -> dict[str, list[tuple[int, bytes]]]:
 def numbers(said: Mapping[str, list[tuple[int, bytes]]]) -> dict[str, np.ndarray]:
     """Each field of all messages, sample by sample, in however many messages they came."""
     found = {}
-    for topic, kind in (("block/parameters", "ParametersBlock"), ("block/residuals", "ResidualsBlock"), ("forces", "Forces")):
+    for topic, kind in (
+        ("block/parameters", "ParametersBlock"),
+        ("block/residuals", "ResidualsBlock"),
+        ("forces", "Forces"),
+    ):
         messages = [typestore().deserialize_cdr(data, f"crash_msgs/msg/{kind}") for _, data in said[topic]]
         for field in ("time_ns", *FIELDS[kind]):
             found[f"{topic}.{field}"] = np.concatenate([getattr(message, field) for message in messages])

@@ -5,8 +5,11 @@ And what has one place in the packages is nowhere else.
 
 import re
 
+import pytest
 from helpers_modules import modules_after
 from helpers_paths import PACKAGES
+
+from crash_estimator.benchmarks.speed_start import commands
 
 
 def test_the_core_imports_neither_ros_nor_the_viewer():
@@ -32,6 +35,19 @@ def test_recordings_bags_and_the_player_work_without_ros():
         "import crash_replay.bag, crash_replay.readers, crash_replay.player\nimport crash_replay.conditioning"
     )
     assert not loaded & {"rclpy", "rerun", "crash_estimator"}
+
+
+HEAVY = {"numba", "scipy.linalg", "scipy.special", "rclpy", "crash_msgs", "rerun", "matplotlib"}
+"""What takes a tenth of a second or more to import."""
+
+
+@pytest.mark.parametrize("name", commands())
+def test_help_needs_nothing_that_takes_long_to_import(name):
+    module = commands()[name]
+    loaded = modules_after(
+        f"sys.argv[1:] = ['--help']\nfrom {module} import main\ntry: main()\nexcept SystemExit: pass\nsys"
+    )
+    assert module in loaded and not loaded & HEAVY
 
 
 EXAMPLE = "air_bag_trigger.py"
@@ -62,10 +78,12 @@ def test_one_place_writes_files():
 
 
 def test_every_main_is_guarded():
-    unguarded = ("warm_up.py", "diagnosis_worker.py", "speed_relay.py", EXAMPLE)  # started by others of ours
+    unguarded = ("warm_up.py", "diagnosis_answerer.py", "speed_relay.py", EXAMPLE)  # started by others of ours
     mains = [file for file in PACKAGES.rglob("*.py") if file.name not in unguarded and "def main(" in file.read_text()]
     assert len(mains) > 10
-    assert [file.name for file in mains if not re.search(r"guarded\(|return run\(", file.read_text())] == []
+    assert [
+        file.name for file in mains if not re.search(r"guarded\(|return (run|node_program)\(", file.read_text())
+    ] == []
 
 
 DIAGNOSIS = PACKAGES / "crash_estimator" / "crash_estimator" / "core" / "diagnosis"

@@ -15,6 +15,7 @@ from crash_estimator.benchmarks.speed_page import renewed_page, whole_page
 from crash_estimator.benchmarks.speed_recordings import chain, ringing
 from crash_estimator.benchmarks.speed_reference import Compiled, Problem, filterpy_step, regressions
 from crash_estimator.benchmarks.speed_row import Row
+from crash_estimator.benchmarks.speed_start import BEGINNINGS, commands
 from crash_estimator.benchmarks.speed_steps import MRLS, filtered
 from crash_estimator.core.compiled.kalman import kalman_update
 from crash_estimator.core.methods import make_estimator
@@ -45,7 +46,7 @@ def test_the_compiled_mrls_rewinds_as_ours(problem, compiled):
     settings = MRLS | {"rewinds": 0}
     theta, information, pull = problem.initial, np.diag(problem.std**-2.0), np.zeros(0)
     pull = information @ theta
-    for psi, y in zip(problem.psi, problem.target):
+    for psi, y in zip(problem.psi, problem.target, strict=True):
         information = MRLS["forgetting"] * information + psi.T / problem.noise @ psi
         pull = MRLS["forgetting"] * pull + psi.T / problem.noise @ y
     expected = np.linalg.solve(information, pull)
@@ -85,6 +86,14 @@ def test_growth_says_how_it_grows(tmp_path):
     rows = list(growth(tmp_path, seconds=(0.3, 0.6), parameters=(2, 4)))
     assert len(rows) == 5 and all("grows as n^" in row.reference for row in rows[:3])
     assert "KiB" in rows[-1].ours and rows[-1].ratio == pytest.approx(1.0, abs=0.1)
+
+
+def test_every_command_is_started_and_ends_by_itself(tmp_path):
+    """With `--help` well; else where its work would begin, of which `synthesize` does the little there is."""
+    assert set(BEGINNINGS) == set(commands())
+    for name, module in commands().items():
+        done = subprocess.run([sys.executable, "-m", module, *BEGINNINGS[name]], cwd=tmp_path, capture_output=True)
+        assert done.returncode == (0 if name == "synthesize" else 1), f"{name}: {done.stderr}"
 
 
 def test_a_row_says_whether_its_reach_is_held():

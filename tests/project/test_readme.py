@@ -8,6 +8,7 @@ import subprocess
 
 import numpy as np
 import pytest
+from conftest import NEEDS_A_GRAPH
 from helpers_paths import ROOT
 from helpers_readme import COMMANDS, EXAMPLE, README, environment, needs_data
 from numpy.testing import assert_allclose
@@ -30,6 +31,14 @@ ALONE = [c for c in COMMANDS if c not in (*MAKE, *LISTENING, *REPLAY, *THREE, *E
 def test_the_first_two_commands_do_everything():
     assert COMMANDS[:2] == ["make demo", "make test"]
     assert "make test" in (ROOT / ".ci" / "run").read_text()
+
+
+def test_make_check_takes_files_that_are_there_and_none_that_starts_a_node():
+    said = subprocess.run(["make", "-n", "check"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    checked = [ROOT / word for word in said.split() if word.startswith("tests/")]
+    assert len(checked) > 5 and all(path.exists() for path in checked) and " --no-graph " in said
+    assert NEEDS_A_GRAPH.search((ROOT / "tests/nodes/test_estimator_node.py").read_text())
+    assert not NEEDS_A_GRAPH.search((ROOT / "tests/core/test_estimators.py").read_text())
 
 
 @pytest.mark.parametrize("command", ALONE)
@@ -58,7 +67,7 @@ def test_the_nodes_find_each_other(tmp_path):
     together = environment()
     nodes = [
         subprocess.Popen(shlex.split(c), cwd=ROOT, env=together, stdout=log, stderr=log)
-        for c, log in zip(LISTENING, logs)
+        for c, log in zip(LISTENING, logs, strict=True)
     ]
     try:
         replay = subprocess.run(

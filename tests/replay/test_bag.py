@@ -75,7 +75,9 @@ def test_mcap_own_ros2_reader_decodes_every_topic(tmp_path):
     for k, channel in enumerate(CHANNELS):
         messages = seen[CHANNEL_TOPICS + channel.name]
         assert len(messages) == 20
-        for (log_time, type_name, message), time_ns, value in zip(messages, written.time_ns, written.values[:, k]):
+        for (log_time, type_name, message), time_ns, value in zip(
+            messages, written.time_ns, written.values[:, k], strict=True
+        ):
             stamp = message.header.stamp.sec * SECOND + message.header.stamp.nanosec
             assert log_time == stamp == time_ns + zero and type_name == CARRIERS[channel.quantity].type
             assert message.header.frame_id == (channel.body or channel.name)

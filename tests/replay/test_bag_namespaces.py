@@ -47,7 +47,9 @@ def test_which_one_has_to_be_said(tmp_path):
     bag = recorded(tmp_path / "b", sled_a=SMALL, root=OTHER)
     with pytest.raises(RecordingError, match=f"holds tests of 2 namespaces; say which one: {bag}#/, {bag}#sled_a$"):
         read_source(bag)
-    with pytest.raises(RecordingError, match=f"no test of the namespace /sled_b is in it; there are: {bag}#/, {bag}#sle"):
+    with pytest.raises(
+        RecordingError, match=f"no test of the namespace /sled_b is in it; there are: {bag}#/, {bag}#sle"
+    ):
         read_source(f"{bag}#sled_b")
 
 

@@ -1,5 +1,7 @@
 """Whether a recording is complete, and what is said where it is not."""
 
+from itertools import pairwise
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -21,7 +23,7 @@ def test_numbers_are_a_set_of_numbers(parts, start, stop):
     assert missing == sorted(set(range(start, stop)) - expected)
     assert len(numbers) == len(expected)
     assert all(a < b for a, b in numbers.spans)
-    assert all(b < a for (_, b), (a, _) in zip(numbers.spans, numbers.spans[1:]))
+    assert all(b < a for (_, b), (a, _) in pairwise(numbers.spans))
     reach = numbers.reach(start)
     assert reach not in expected and set(range(start, reach)) <= expected
 

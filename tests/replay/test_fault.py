@@ -118,20 +118,20 @@ def test_a_signal_whose_exception_is_lost_comes_again(capsys):
 
 OF_A_BAG = ["impactor_single.mcap", "--model", "impactor_single"]
 COMMANDS = [
-    (estimate, "load_model", OF_A_BAG),
-    (simulate, "load_model", OF_A_BAG),
-    (diagnose, "load_model", OF_A_BAG),
-    (report, "load_model", [*OF_A_BAG, "--to", "out"]),
-    (import_command, "read_source", ["a.csv", "--to", "b.mcap"]),
-    (synthesize_command, "write_bag", ["impactor_single", "--to", "b.mcap"]),
-    (demo, "claim", ["--recording", "a.mcap"]),
+    (estimate, "crash_estimator.cli.work.estimate.load_model", OF_A_BAG),
+    (simulate, "crash_estimator.cli.work.simulate.load_model", OF_A_BAG),
+    (diagnose, "crash_estimator.cli.work.diagnose.load_model", OF_A_BAG),
+    (report, "crash_estimator.cli.work.report.load_model", [*OF_A_BAG, "--to", "out"]),
+    (import_command, "crash_replay.import_command.read_source", ["a.csv", "--to", "b.mcap"]),
+    (synthesize_command, "crash_replay.synthesize_command.write_bag", ["impactor_single", "--to", "b.mcap"]),
+    (demo, "crash_estimator.demo.start.claim", ["--recording", "a.mcap"]),
 ]
 
 
 @pytest.mark.parametrize("command, step, arguments", COMMANDS, ids=lambda value: getattr(value, "__name__", None))
 def test_every_command_ends_with_a_line(command, step, arguments, monkeypatch, capsys, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(command, step, lambda *_, **__: raising(RuntimeError("broken"))())
+    monkeypatch.setattr(step, lambda *_, **__: raising(RuntimeError("broken"))())
     if command is demo:
         monkeypatch.setattr(demo, "interrupted_by_signals", nullcontext)
     monkeypatch.setattr(sys, "argv", ["command", *arguments])

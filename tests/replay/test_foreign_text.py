@@ -15,7 +15,7 @@ from helpers_paths import BAGS
 
 from crash_estimator.cli import diagnose, estimate, report, simulate
 from crash_estimator.demo.choice import Choice
-from crash_estimator.demo.command import _announcement
+from crash_estimator.demo.start import _announcement
 from crash_estimator.demo.terminal import Terminal
 from crash_estimator.model_file import load_model
 from crash_estimator.viewer.summary import row

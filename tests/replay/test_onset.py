@@ -50,7 +50,8 @@ def test_a_shifted_time_zero_is_found_within_two_samples(name):
 
 @pytest.mark.parametrize("name", MEASURED)
 def test_of_measured_tests_the_same_instant_is_found_whatever_is_stated(name):
-    """Nobody knows their truth: what is stated is a contact switch's or a person's word, within 1 ms of what is found."""
+    """Nobody knows their truth: what is stated is a contact switch's or a person's word, within 1 ms of what is
+    found."""
     if not (DATA / name).exists():
         pytest.skip(f"{DATA / name} is not there")
     recording = read_source(DATA / name)

@@ -35,7 +35,7 @@ def test_a_publisher_that_holds_few_messages_gets_no_more_of_them():
     for on_time in (True, False):
         publisher = Publisher()
         publisher.acknowledged = False
-        flow = Flow(lambda: [publisher], print, depth=10)
+        flow = Flow(lambda publisher=publisher: [publisher], print, depth=10)
         sent = 0
         while flow.has_room(0.0, on_time):
             flow.sent(1, 100)

@@ -135,7 +135,7 @@ def test_a_diagnosis_that_was_stopped_gives_the_same_answer(stage):
         stage.spin_until(final, "the diagnosis has answered", 4 * PATIENCE)
         given = final()[0]
         diagnosis.send_signal(signal.SIGINT)
-        stage.spin_until(lambda: diagnosis.poll() is not None, "it has ended")
+        stage.spin_until(lambda diagnosis=diagnosis: diagnosis.poll() is not None, "it has ended")
         assert diagnosis.returncode == 0
         if stop:
             assert (given.verdict, given.number, given.ranking) == (

@@ -20,7 +20,7 @@ def test_what_comes_in_a_rush_is_drawn_when_enough_of_it_waits_and_the_rest_at_o
     began = time.monotonic()
     put = 0
     while not drawn and time.monotonic() - began < PATIENCE:
-        target.put(lambda: drawn.append(put), size=big)
+        target.put(lambda: drawn.append(put), size=big)  # noqa: B023 - how many were put when it is drawn
         put += 1
         time.sleep(0.02)
     assert drawn[0] >= 10

@@ -15,15 +15,15 @@ setup(
     ],
     entry_points={
         "console_scripts": [
-            "composed = crash_estimator.nodes.composed:main",
+            "composed = crash_estimator.nodes.composed_command:main",
             "demo = crash_estimator.demo.command:main",
             "diagnose = crash_estimator.cli.diagnose:main",
-            "diagnosis = crash_estimator.nodes.diagnosis_node:main",
+            "diagnosis = crash_estimator.nodes.diagnosis_command:main",
             "estimate = crash_estimator.cli.estimate:main",
-            "estimator = crash_estimator.nodes.estimator_node:main",
+            "estimator = crash_estimator.nodes.estimator_command:main",
             "report = crash_estimator.cli.report:main",
             "simulate = crash_estimator.cli.simulate:main",
-            "viewer = crash_estimator.nodes.viewer_node:main",
+            "viewer = crash_estimator.nodes.viewer_command:main",
         ]
     },
 )

@@ -13,8 +13,8 @@ setup(
         "console_scripts": [
             "import = crash_replay.import_command:main",
             "synthesize = crash_replay.synthesize_command:main",
-            "record = crash_replay.record_node:main",
-            "replay = crash_replay.replay_node:main",
+            "record = crash_replay.record_command:main",
+            "replay = crash_replay.replay_command:main",
         ]
     },
 )

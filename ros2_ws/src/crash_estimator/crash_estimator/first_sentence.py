@@ -1,6 +1,6 @@
 """What a crash engineer would write first of a test and its model: does it hold, how well, and what does it lack."""
 
-from scipy.constants import g as G
+from crash_replay.gravity import G
 
 from .core.diagnosis import Diagnosis
 

@@ -1,8 +1,6 @@
 """Model files: YAML -> Structure. The keys are those of the README's table; nothing in a file is executed."""
 
 from collections.abc import Mapping
-from difflib import get_close_matches
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,6 +13,7 @@ from crash_replay.yaml_schema import Text, number, read_yaml
 from .core.effects.effect import Effect
 from .core.effects.targets import check_effects
 from .core.structure import Body, Coefficient, EffectSpec, Element, ModelError, Structure, Term
+from .ready_models import model_path
 
 MOST_PARTS = 100
 """Bodies, elements or effects: the work on a sample grows with the square of them and more."""
@@ -210,32 +209,6 @@ class ModelFile(Part):
             tuple(part.element(name) for name, part in self.elements.items()),
             tuple(part.effect() for part in self.effects),
         )
-
-
-def ready_models() -> dict[str, Path]:
-    """The models that ship with the package, by name."""
-    folder = Path(str(files("crash_estimator") / "models"))
-    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
-
-
-MODEL = f"a .yaml file, or one of {', '.join(ready_models())}"
-"""What a model may be given as."""
-
-
-def model_path(name_or_path: str | Path) -> Path:
-    """The file of a ready model by its name, or the path itself."""
-    path = Path(name_or_path)
-    if path.suffix in (".yaml", ".yml"):
-        return path
-    ready = ready_models()
-    if str(name_or_path) not in ready:
-        near = get_close_matches(str(name_or_path), ready, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ModelError(
-            f"there is no model {str(name_or_path)!r}: give one of {', '.join(ready)}, "
-            f"or the path of a .yaml file{hint}"
-        )
-    return ready[str(name_or_path)]
 
 
 def load_model(name_or_path: str | Path, effects: Mapping[str, Effect] | None = None) -> Structure:

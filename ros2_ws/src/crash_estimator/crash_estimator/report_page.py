@@ -32,13 +32,13 @@ from .page_html import html_page
 from .page_markdown import write_markdown_page
 from .report_figures import Result, column_of, equations_of, result_figures, time_of
 from .tables import error_table, parameter_table, unit_of
-from .validation_tables import comparison_table, covariance_table, whiteness_table
+from .validation_tables import comparison_table, correlation_table, covariance_table
 
 REVISED = "revision 1"
 """What the model with what was found is called, beside the model as it was given."""
 
 
-def write_report(
+def write_report(  # noqa: PLR0913 - every option of the command
     recording: Recording,
     structure: Structure,
     methods: Sequence[str],
@@ -54,8 +54,8 @@ def write_report(
 ) -> Path:
     """Write `report.html` into the folder, with `markdown` also `report.md` and its figures -> the page.
 
-    The settings go to the methods that have them; seconds: after which the diagnosis tries nothing more; `told` hears of
-    each part when it is done, and how long it took.
+    The settings go to the methods that have them; seconds: after which the diagnosis tries nothing more; `told` hears
+    of each part when it is done, and how long it took.
     """
     structure, (recording,) = with_accelerations(structure, [recording])
     if not ((recording.time > 0.0) & (recording.time <= end)).any():
@@ -162,7 +162,7 @@ def _tables(results: dict[str, Result]) -> list[Block]:
     page += [Heading("The error (tables 5.4 and 6.1)")]
     for method, result in results.items():
         validation = result.validation
-        text = [error_table(validation.errors), covariance_table(validation), whiteness_table(validation)]
+        text = [error_table(validation.errors), covariance_table(validation), correlation_table(validation)]
         page += [Paragraph(method), Lines("\n\n".join(text))]
     return [*page, Paragraph("Cross-correlation of the error with the inputs, lag 0 (table 5.4):"), _cross(results)]
 
@@ -220,13 +220,13 @@ def _free_runs(
                 f"{equation}, {compared}",
                 shown,
                 smooth(first.measured[:, k]) * factor,
-                lambda name: smooth(simulated[name].predicted[:, at[name]]) * factor,
+                lambda name, at=at, factor=factor: smooth(simulated[name].predicted[:, at[name]]) * factor,
             )
         )
     for k, body in enumerate(structure.bodies):
         if body.free and body.acceleration:
             at = {name: s.body_index[body.name] for name, (s, _) in runs.items()}
-            column = lambda name: simulated[name].velocity[:, at[name]]  # noqa: E731
+            column = lambda name, at=at: simulated[name].velocity[:, at[name]]  # noqa: E731
             panels.append(panel(f"{body.name}: velocity", "m/s", first.measured_velocity[:, k], column))
     blocks: list[Block] = [Heading("Free run (figures 4.16 to 4.19, 6.13, 6.14)")]
     for name, (s, r) in runs.items():
@@ -269,6 +269,8 @@ def _masses(recording: Recording, structure: Structure, end: float) -> list[Bloc
     time_ms, sigma = time_of(estimates), partial(column_of, estimates, "std")
     lines = [Line(time_ms, column_of(estimates, "parameters", k), n, spread=sigma(k)) for k, n in enumerate(names)]
     panel = Panel("effective masses", "time in ms", "kg", lines, y_range=(0.0, 2.0 * float(last.parameters.sum())))
-    found = ", ".join(f"{name} {m:.0f} +- {s:.0f} kg" for name, m, s in zip(names, last.parameters, last.std))
+    found = ", ".join(
+        f"{name} {m:.0f} +- {s:.0f} kg" for name, m, s in zip(names, last.parameters, last.std, strict=True)
+    )
     text = f"{found}; together {last.parameters.sum():.0f} kg."
     return [Heading("Effective masses (figures 4.12, 4.26)"), Paragraph(text), Figure("masses", [panel], columns=1)]

@@ -37,7 +37,7 @@ def svg_panel(panel: Panel, height: int) -> str:
     for line, colour in zip(panel.lines, colours):
         if line.spread is not None:
             parts.append(_band(line, colour, at))
-    parts += [_line(line, colour, at) for line, colour in zip(panel.lines, colours)]
+    parts += [_line(line, colour, at) for line, colour in zip(panel.lines, colours, strict=False)]
     for value, _ in panel.levels:
         _, y = at(0.0, value)
         parts.append(f'<path class="level" d="M{LEFT} {y:.1f}H{right}"/>')
@@ -143,10 +143,10 @@ def thinned(line: Line) -> tuple[np.ndarray, np.ndarray]:
 def _line(line: Line, colour: str, at) -> str:
     x, y = at(*thinned(line))
     if line.style == "o":
-        dots = "".join(f"M{a:.1f} {b:.1f}h0" for a, b in zip(x, y) if np.isfinite(a + b))
+        dots = "".join(f"M{a:.1f} {b:.1f}h0" for a, b in zip(x, y, strict=True) if np.isfinite(a + b))
         return f'<path class="dots" stroke="{escape(colour)}" d="{dots}"/>'
     path, down = [], False
-    for a, b in zip(x, y):
+    for a, b in zip(x, y, strict=True):
         valid = bool(np.isfinite(a + b))
         if valid:
             path.append(f"{'L' if down else 'M'}{a:.1f} {b:.1f}")
@@ -159,5 +159,5 @@ def _band(line: Line, colour: str, at) -> str:
     other, high = thinned(line._replace(y=line.y + line.spread))
     valid, also = np.isfinite(low), np.isfinite(high)
     across, up = at(np.r_[x[valid], other[also][::-1]], np.r_[low[valid], high[also][::-1]])
-    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, up))
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, up, strict=True))
     return f'<polygon fill="{escape(colour)}" fill-opacity="0.15" points="{points}"/>' if points else ""

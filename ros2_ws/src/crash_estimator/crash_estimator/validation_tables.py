@@ -9,14 +9,14 @@ from .core.validation import LEVELS, Validation
 from .tables import table, unit_of
 
 
-def whiteness_table(validation: Validation) -> str:
-    """Per equation: is the error white, and what it goes along with most; limits at 90, 95 and 99 %."""
+def correlation_table(validation: Validation) -> str:
+    """Per equation: is the error uncorrelated, and what it goes along with most; limits at 90, 95 and 99 %."""
     rows = []
     for equation in validation.equations:
         if equation.auto is None:
             rows.append((equation.equation, str(equation.samples), *["-"] * 6))
             continue
-        white = [f"{level:.0%}" for level in LEVELS if equation.white(level)]
+        passed = [f"{level:.0%}" for level in LEVELS if equation.uncorrelated(level)]
         name, share = strongest_input(equation.cross)
         rows.append(
             (
@@ -24,14 +24,14 @@ def whiteness_table(validation: Validation) -> str:
                 str(equation.samples),
                 f"{equation.auto.values[1]:+.2f}",
                 *(f"{equation.auto.inside(level):.0%}" for level in LEVELS),
-                f"at {white[0]}" if white else "no",
+                f"at {passed[0]}" if passed else "no",
                 f"{name} {share:.1f}",
             )
         )
     lags = next((e.degrees for e in validation.equations if e.auto is not None), 0)
     inside = [f"lags in {level:.0%}" for level in LEVELS]
-    head = (f"{validation.what} of", "samples", "lag 1", *inside, "white", "largest with / 99 % limit")
-    note = f"({lags} lags; white: Ljung and Box's Q; one lag in twenty leaves its 95 % limit by chance)"
+    head = (f"{validation.what} of", "samples", "lag 1", *inside, "uncorrelated", "largest with / 99 % limit")
+    note = f"({lags} lags; uncorrelated: Ljung and Box's Q; one lag in twenty leaves its 95 % limit by chance)"
     return f"{table(head, rows)}\n{note}"
 
 
@@ -54,7 +54,7 @@ def covariance_table(validation: Validation) -> str:
             "",
             *(f"{r:+.2f}" for r in validation.correlation[k]),
         )
-        for k, (name, e) in enumerate(zip(names, validation.errors))
+        for k, (name, e) in enumerate(zip(names, validation.errors, strict=True))
     ]
     return table(("covariance of the error", *names, "correlation:", *names), rows)
 

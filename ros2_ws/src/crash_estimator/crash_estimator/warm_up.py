@@ -1,4 +1,5 @@
-"""`python -m crash_estimator.warm_up`: compile all that is compiled into the cache, so that no first start waits for it."""
+"""`python -m crash_estimator.warm_up`: compile all that is compiled into the cache, so that no first start waits for
+it."""
 
 import sys
 import time

@@ -98,7 +98,8 @@ def _records(file: Path, stream: BinaryIO) -> Iterator[McapRecord]:
         data = _unpacked(record, left) if record.uncompressed_size <= left else None
         if data is None:
             raise RecordingError(
-                f"{file}: its {size} bytes would unpack to more than {left} further ones, as no recording's do: not read"
+                f"{file}: its {size} bytes would unpack to more than {left} further ones, as no recording's do: not "
+                "read"
             )
         left -= len(data)
         yield from breakup_chunk(replace(record, compression="", data=data), validate_crc=True)

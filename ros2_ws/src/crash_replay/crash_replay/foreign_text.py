@@ -16,8 +16,8 @@ TAG = re.compile(r"<(?=[A-Za-z/!?])")
 
 
 def visible(text: object) -> str:
-    """On one line: what does not print (escape sequences, line ends, marks that turn the direction of writing) as an
-    escape such as \\x1b, another kind of space as a space."""
+    r"""On one line: what does not print (escape sequences, line ends, marks that turn the direction of writing) as an
+    escape such as \x1b, another kind of space as a space."""
     text = str(text)
     return text if text.isprintable() else "".join(map(_shown, text))
 

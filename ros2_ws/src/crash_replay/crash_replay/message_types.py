@@ -83,8 +83,8 @@ def test_from_msg(message: Any) -> Test:
         tuple(Channel(c.name, c.quantity, c.body, c.axis, c.source) for c in message.channels),
         message.title,
         message.source,
-        dict(zip(bodies, map(float, message.initial_velocity))),
-        dict(zip(bodies, map(float, message.initial_displacement))),
+        dict(zip(bodies, map(float, message.initial_velocity), strict=False)),
+        dict(zip(bodies, map(float, message.initial_displacement), strict=False)),
         tuple(message.notes),
         _impact_ns(message.time_zero),
     )

@@ -9,14 +9,15 @@ follow_changes(self, PARAMETERS, self.change)     # self.change({"every": 0.001}
 import re
 from collections.abc import Callable, Mapping
 from difflib import get_close_matches
-from typing import Any, NamedTuple
-
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
-from rclpy.node import Node
-from rclpy.parameter import Parameter
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .fault import Fault
 from .limits import TEXT, shown
+
+if TYPE_CHECKING:  # a table can be read without ROS
+    from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+    from rclpy.node import Node
+    from rclpy.parameter import Parameter
 
 KIND = {str: "a text", bool: "true or false", int: "a whole number", float: "a number", list: "a list of names"}
 OF_EVERY_NODE = ("use_sim_time", "start_type_description_service", "qos_overrides")
@@ -41,7 +42,7 @@ class Allowed(NamedTuple):
     live: bool = False  # whether it may be set while the node runs; any other is read-only
 
 
-def given_to(node: Node) -> dict[str, Any]:
+def given_to(node: "Node") -> dict[str, Any]:
     """What a node was started with.
 
     It must have declared its overrides by itself, untyped: so what is wrong with one is said in our words.
@@ -49,7 +50,7 @@ def given_to(node: Node) -> dict[str, Any]:
     return {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
 
 
-def declare_parameters(node: Node, table: Mapping[str, Allowed]) -> dict[str, Any]:
+def declare_parameters(node: "Node", table: Mapping[str, Allowed]) -> dict[str, Any]:
     """Declare all of them and give their values. Raises ParameterError, also where one is given that there is not."""
     given = given_to(node)
     for name in given:
@@ -68,10 +69,11 @@ def declare_parameters(node: Node, table: Mapping[str, Allowed]) -> dict[str, An
     return values
 
 
-def follow_changes(node: Node, table: Mapping[str, Allowed], change: Callable[[dict[str, Any]], None]) -> None:
+def follow_changes(node: "Node", table: Mapping[str, Allowed], change: Callable[[dict[str, Any]], None]) -> None:
     """change: is given those that somebody sets while the node runs, all or none; a Fault from it refuses them."""
+    from rcl_interfaces.msg import SetParametersResult
 
-    def follow(parameters: list[Parameter]) -> SetParametersResult:
+    def follow(parameters: "list[Parameter]") -> "SetParametersResult":
         try:
             new = {p.name: checked(table, p.name, p.value) for p in parameters if p.name in table}
             if new:
@@ -131,7 +133,9 @@ def names_in(value: list[str]) -> list[str]:
     return [name for name in value if name]
 
 
-def _descriptor(allowed: Allowed) -> ParameterDescriptor:
+def _descriptor(allowed: Allowed) -> "ParameterDescriptor":
+    from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+
     one_of = f"one of {', '.join(allowed.choices)}" if allowed.choices else ""
     descriptor = ParameterDescriptor(
         description=allowed.meaning, read_only=not allowed.live, additional_constraints=one_of or allowed.pattern

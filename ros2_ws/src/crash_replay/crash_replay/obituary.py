@@ -12,7 +12,8 @@ import struct
 
 LOOPBACK = "127.0.0.1"
 PARTICIPANTS = 120
-"""Of one domain on one machine: as many as have ports of their own before those of the next domain (RTPS 2.2, 9.6.1.4)."""
+"""Of one domain on one machine: as many as have ports of their own before those of the next domain (RTPS 2.2,
+9.6.1.4)."""
 PROTOCOL, VENDOR = b"RTPS\x02\x03", b"\x01\x0f"
 PARTICIPANT, ANNOUNCER, LISTENER = b"\x00\x00\x01\xc1", b"\x00\x01\x00\xc2", b"\x00\x01\x00\xc7"
 """Entities of each participant: itself, what it announces itself with, and hears others with (RTPS 2.2, table 9.2)."""

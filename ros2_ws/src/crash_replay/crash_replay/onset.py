@@ -8,8 +8,8 @@ What is found does not depend on the stated time zero.
    deviations of such means, and HOLDS for as long again.
 3. Change point. Around the alarm, for every instant k: before k a channel is at rest, from k on it follows
    b0 + b1 (t - t_k) + b2 (t - t_k)^2, with its own coefficients by least squares. Onset is the k with the smallest sum
-   of squared residuals, in units of the channels' noise, over all channels that have woken by the end of the window: the
-   maximum of the likelihood of a change from rest to a smooth rise.
+   of squared residuals, in units of the channels' noise, over all channels that have woken by the end of the window:
+   the maximum of the likelihood of a change from rest to a smooth rise.
 
 A jump is found to the sample; a rise out of the noise as precisely as its slope allows: the instants that fit almost as
 well (AS_WELL) say how precisely.
@@ -57,7 +57,7 @@ def find_onset(recording: Recording) -> Onset | None:
         return None
     run = max(LEAST_RUN, round(RUN / period))
     names, columns, alarms = [], [], []
-    for channel, values in zip(recording.test.channels, recording.values.T):
+    for channel, values in zip(recording.test.channels, recording.values.T, strict=True):
         if channel.quantity not in RESTS_AT_ZERO or not np.isfinite(values[:quiet]).all():
             continue
         column = _in_its_noise(values, quiet, run)

@@ -178,5 +178,5 @@ class Recording:
 
     def samples(self) -> Iterator[Sample]:
         """The samples in order, as a live replay would deliver them."""
-        for number, (time_ns, values) in enumerate(zip(self.time_ns.tolist(), self.values)):
+        for number, (time_ns, values) in enumerate(zip(self.time_ns.tolist(), self.values, strict=True)):
             yield Sample(number, time_ns, values)

@@ -1,4 +1,4 @@
-"""`replay`: publishes a recording at its sample rate times `rate`, under control by services."""
+"""The node of `replay`: a recording is published as its clockwork says; `replay_command` says with what."""
 
 import math
 import signal
@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from threading import Thread
-from typing import Any
+from typing import Any, TypeVar
 
 import rclpy
 from crash_msgs.srv import Burst, Seek, SetRate, Step
@@ -34,6 +34,8 @@ from .rosbag2_services import serve_as_rosbag2
 from .said import say
 from .samples_again import serve_samples
 from .selection import samples_within, select_channels
+
+Other = TypeVar("Other", bound=Node)
 
 TRIGGERS = {
     "pause": Player.pause,
@@ -173,9 +175,9 @@ def replay_in_turn() -> int:
 
 
 def replay_beside(
-    make_others: Callable[[], Sequence[Node]] = tuple,
+    make_others: Callable[[], Sequence[Other]] = tuple,
     make: Callable[[], ReplayNode] = ReplayNode,
-    hear_out: Callable[[ReplayNode, Sequence[Node]], int] = lambda node, others: 0,
+    hear_out: Callable[[ReplayNode, Sequence[Other]], int] = lambda node, others: 0,
     arguments: Sequence[str] | None = None,
 ) -> int:
     """A replay, with other nodes in the same process, till it is over -> exit status.

@@ -2,6 +2,7 @@
 
 import signal
 from collections.abc import Callable
+from typing import TypeVar
 
 import rclpy
 from rclpy.clock import Clock, ClockType
@@ -15,6 +16,8 @@ from rclpy.task import Future
 from .fault import guarded, tell
 from .middleware import prepare_middleware
 from .starting import ENDING
+
+Made = TypeVar("Made", bound=Node)
 
 LOOK = 0.1
 """s between two looks at whether a signal has come."""
@@ -31,9 +34,9 @@ def spin(executor: Executor, until: Future) -> None:
 
 
 def run(
-    make: Callable[[], Node],
-    until: Callable[[Node], Future] = lambda node: Future(),
-    close: Callable[[Node], str | None] = lambda node: None,
+    make: Callable[[], Made],
+    until: Callable[[Made], Future] = lambda node: Future(),
+    close: Callable[[Made], str | None] = lambda node: None,
 ) -> int:
     """Make a node and run it until the future is done or a signal ends it -> exit status.
 
@@ -42,7 +45,7 @@ def run(
     return guarded(lambda: _run(make, until, close), also=(ParameterException,))
 
 
-def _run(make: Callable[[], Node], until: Callable[[Node], Future], close: Callable[[Node], str | None]) -> int:
+def _run(make: Callable[[], Made], until: Callable[[Made], Future], close: Callable[[Made], str | None]) -> int:
     # A signal must end the node between two callbacks, not take the context away under the executor.
     signals: list[int] = []
     for number in ENDING:

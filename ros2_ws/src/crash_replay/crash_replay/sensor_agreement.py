@@ -1,7 +1,8 @@
 """Do the accelerometers of one body tell of the same motion? The outlier is found by what they integrate to.
 
 Sensors on a rigid part may show quite different peaks, each its own panel's ringing, and still integrate to the same
-change of velocity. So each sensor's velocity v_i(t) since the impact is compared with the median of all at each instant:
+change of velocity. So each sensor's velocity v_i(t) since the impact is compared with the median of all at each
+instant:
 
     deviation_i = max |v_i - median(v)| / max |median(v)|
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from .readers.units import G
+from .gravity import G
 from .recording import SI_UNIT
 
 SCALES: Mapping[str, tuple[tuple[float, str, float], ...]] = {

@@ -38,8 +38,10 @@ def page(rows: Sequence[dict], times: Sequence[dict], planned: int, code: str) -
     counts += f" A stop named for a gap (see below) counts as right in {gaps} of them."
     parts = [
         HEAD, counts, "## Asked and reached", _asked(drawn, times), "## By effect", _by_effect(drawn),
-        "## By structure", _by_structure(drawn), "## Verdicts", _verdicts(drawn), "## Coefficients", _coefficients(drawn),
-        "## Two effects at once", _two(drawn), "## Where it gets hard", _hard(drawn), "## Time", _time(times), "## How the cases are made", HOW,
+        "## By structure", _by_structure(drawn), "## Verdicts", _verdicts(drawn), "## Coefficients",
+        _coefficients(drawn),
+        "## Two effects at once", _two(drawn), "## Where it gets hard", _hard(drawn), "## Time", _time(times),
+        "## How the cases are made", HOW,
         "## Cases that were not right", _not_right(drawn),
     ]  # fmt: skip
     return "\n\n".join(parts) + "\n"

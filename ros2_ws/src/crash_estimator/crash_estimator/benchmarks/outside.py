@@ -10,10 +10,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from time import process_time
 
-from scipy.constants import g as G
-
 from crash_replay.conditioning import filter_recording
 from crash_replay.fault import guarded
+from crash_replay.gravity import G
 from crash_replay.readers import read_source
 from crash_replay.recording import RecordingError
 from crash_replay.said import Parser, say

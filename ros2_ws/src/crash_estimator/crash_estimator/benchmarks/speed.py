@@ -20,13 +20,14 @@ from .speed_growth import growth
 from .speed_live import Effort, Live
 from .speed_page import renewed_page, whole_page
 from .speed_row import HEAD, Row
+from .speed_start import starts
 from .speed_steps import steps
 
 QUICK = Effort(
     singles=0.1, blocks=0.5, seen=0.5, turns=1, rounds=1, hold=1.0, probe=0.5, rates=(2e3,), latency=200, jitter=0.3,
     lockstep=2,
 )  # fmt: skip
-PARTS = ("steps", "growth", "throughput", "latency", "jitter", "viewer", "named", "real_time", "lockstep")
+PARTS = ("start", "steps", "growth", "throughput", "latency", "jitter", "viewer", "named", "real_time", "lockstep")
 
 
 def main() -> None:
@@ -60,12 +61,14 @@ def benchmark(arguments: argparse.Namespace) -> None:
 
 
 def _parts(folder: Path, effort: Effort, arguments) -> Iterator[tuple[str, Callable[[], list[Row]]]]:
+    if "start" in arguments.only:
+        yield "start", lambda: list(starts(folder, **({"repeats": 1} if arguments.quick else {})))
     if "steps" in arguments.only:
         yield "steps", lambda: list(steps(folder))
     if "growth" in arguments.only:
         shorter = {"seconds": (0.1, 1.0), "parameters": (2, 6)} if arguments.quick else {}
         yield "growth", lambda: list(growth(folder, **shorter))
-    live = [name for name in PARTS[2:] if name in arguments.only]
+    live = [name for name in PARTS[3:] if name in arguments.only]
     if not live:
         return
     environment = own_environment()

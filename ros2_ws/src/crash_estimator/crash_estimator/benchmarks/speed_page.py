@@ -15,7 +15,8 @@ Made by `make benchmark` on {machine}, {cores} cores, load {load:.1f} before it 
 
 Each row is measured beside its reference in the same run, in turns; a ratio holds on another machine, a time does not.
 A machine that does other work makes every row worse, those with several processes most. Throughputs are medians of
-six passes in turns with the reference's, their ratio is the median of the six ratios.
+six passes in turns with the reference's, their ratio is the median of the six ratios. The processor times of
+commands are medians of five starts.
 """
 
 

@@ -39,7 +39,7 @@ class Relay(Node):
         self.out = {kind: self.create_publisher(kind, f"~/{topic}", STREAM) for kind, topic in TOPICS.items()}
         self.create_subscription(Samples, "samples", self._on_samples, EVERY_SAMPLE)
 
-    @lru_cache(maxsize=16)
+    @lru_cache(maxsize=16)  # noqa: B019 - the one node lives as long as its process
     def _empty(self, samples: int) -> list:
         """Messages for so many samples; they are filled once."""
         messages = []

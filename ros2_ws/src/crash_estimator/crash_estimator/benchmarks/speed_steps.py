@@ -1,6 +1,7 @@
 """How long one step takes: called for each sample, and over a whole record; filterpy, numpy and C++ beside it."""
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,9 @@ SETTINGS = {"forgetting": 0.98, "m": 5, "cr": 3.0, "error_limit": 2.58, "rewinds
 
 
 @njit(cache=True)
-def _filter(theta, factors, noise, psi, target, walk, active, lower, upper, scale, smallest, clamped):
+def _filter(  # noqa: PLR0913 - compiled: arrays only
+    theta, factors, noise, psi, target, walk, active, lower, upper, scale, smallest, clamped
+):  # fmt: skip
     unit = np.empty(len(theta))
     for t in range(len(psi)):
         for j in range(len(theta)):
@@ -69,8 +72,8 @@ def _kalman_calls(structure, recording, problem: Problem) -> Iterator[Row]:
         state = estimator.init()
         state, _ = estimator.follow(state, recording.time_ns[: middle.number], recording.values[: middle.number])
         time_ns, values = recording.time_ns[middle.number :][:1], recording.values[middle.number :][:1]
-        one = per_call(lambda: estimator.follow(state, time_ns, values))
-        whole = per_call(lambda: estimator.step(state, middle))
+        one = per_call(partial(estimator.follow, state, time_ns, values))
+        whole = per_call(partial(estimator.step, state, middle))
         name = f"whole estimator, {method}, a call per sample"
         yield Row(f"{name}, numbers only (`follow`)", microseconds(one), said + ", filter alone", ratio(one))
         yield Row(f"{name}, with its Estimate (`step`)", microseconds(whole), said + ", filter alone", ratio(whole))
@@ -86,13 +89,16 @@ def _records(structure, recording, problem: Problem, compiled: Compiled | None) 
     yield _beside("constrained Kalman filter, a sample of a record", alone, limits.get("constrained_kalman"), 5.0)
     for method, settings in (("constrained_kalman", {}), ("mrls", SETTINGS)):
         estimator = make_estimator(structure, recording.test, method, **settings)
-        everything = recording.time_ns, recording.values
-        record = per_call(lambda: estimator.follow(estimator.init(), *everything)) / len(recording)
+        record = per_call(partial(_followed, estimator, recording)) / len(recording)
         name = f"whole estimator, {method}, a sample of a record"
         yield _beside(name, record, limits.get(method), None, ", recursion alone")
         readable = make_estimator(structure, recording.test, method, compiled=False, **settings)
-        plain = per_call(lambda: run(readable, samples[:400]), 0.01) / 400
+        plain = per_call(partial(run, readable, samples[:400]), 0.01) / 400
         yield Row(name, microseconds(record), f"numpy {microseconds(plain)}", plain / record)
+
+
+def _followed(estimator, recording):
+    return estimator.follow(estimator.init(), recording.time_ns, recording.values)
 
 
 def _beside(what: str, seconds: float, limit: float | None, reach: float | None, note: str = "") -> Row:

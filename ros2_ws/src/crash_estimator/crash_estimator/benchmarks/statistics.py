@@ -14,7 +14,8 @@ class Share(NamedTuple):
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's 95 % interval (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927): honest near 0 and 1; of nothing 0 to 1."""
+        """Wilson's 95 % interval (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927): honest near 0 and 1; of nothing 0 to
+        1."""
         if not self.of:
             return 0.0, 1.0
         p, n, z2 = self.hits / self.of, self.of, Z95**2

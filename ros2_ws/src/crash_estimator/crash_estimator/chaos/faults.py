@@ -5,6 +5,7 @@ import signal
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from typing import Protocol
 
 from .case import FINISHED, FULL_DISK, HANG_UP, KILL, LASTING, PLAYED, RESTART, STOP, Fault
@@ -55,7 +56,7 @@ class Faults:
     def _begin(self, fault: Fault, process: int, now: float) -> None:
         self.log.append(f"{fault.name}: process {process}, {self.run.played:.0f} % of the samples sent")
         top = self.run.top(fault.member)
-        come_back: Callable[[], None] = lambda: None
+        come_back: Callable[..., None] = _nothing_to_do
         if fault.kind == HANG_UP:
             top.hang_up()
         elif fault.kind in (KILL, RESTART) and top:
@@ -63,7 +64,7 @@ class Faults:
             come_back = top.start
         elif fault.kind == STOP:
             send(process, signal.SIGSTOP)
-            come_back = lambda: send(process, signal.SIGCONT)
+            come_back = partial(send, process, signal.SIGCONT)
         elif fault.kind == FULL_DISK:
             for one in [process, *children_of(process)]:
                 full = max(furthest_written(one), ROOM)
@@ -73,3 +74,7 @@ class Faults:
             send(process, signal.SIGKILL)
         if fault.kind in LASTING:
             self.ends.append((now + fault.seconds, come_back))
+
+
+def _nothing_to_do() -> None:
+    pass

@@ -46,9 +46,7 @@ class OpaqueFunction:
 
 
 class Node:
-    def __init__(
-        self, *, package, executable, name=None, namespace=None, output=None, arguments=(), ros_arguments=()
-    ):
+    def __init__(self, *, package, executable, name=None, namespace=None, output=None, arguments=(), ros_arguments=()):
         self.package, self.executable, self.name, self.namespace = package, executable, name, namespace
         self.arguments, self.ros_arguments = list(arguments), list(ros_arguments)
 

@@ -32,7 +32,7 @@ ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THRE
 STARTED_BY_ONE = ("demo", "replay", "diagnosis", "viewer", "record")
 """Names of nodes, beside the estimators'."""
 MARKS = {
-    "worker": "diagnosis_worker",  # the diagnosis's process that computes
+    "worker": "diagnosis_answerer",  # the diagnosis's process that computes
     "replay": "/crash_replay/replay ",
     "estimator": "/crash_estimator/estimator ",
     "diagnosis": "/crash_estimator/diagnosis ",

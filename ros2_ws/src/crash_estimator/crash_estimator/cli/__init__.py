@@ -1,0 +1,1 @@
+"""Commands without a ROS graph, one file each: its command line."""

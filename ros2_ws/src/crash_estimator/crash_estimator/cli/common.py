@@ -1,4 +1,4 @@
-"""What the commands share: what they read and write, settings on the command line, JSON without NaN."""
+"""What the commands share in their work: what they read and write, settings from the command line, JSON without NaN."""
 
 import argparse
 import json
@@ -17,9 +17,7 @@ from ..core.effects import EFFECTS
 from ..core.effects.effect import Effect
 from ..core.effects.user import load_effects
 from ..core.structure import ModelError
-from ..model_file import model_path
-
-RECORDING = "a recording in any form: bag, CSV with its YAML, NHTSA EV5 or ISO-MME folder, nhtsa:NUMBER"
+from ..ready_models import model_path
 
 
 def read_crash(source: str) -> Recording:
@@ -33,33 +31,11 @@ def read_crash(source: str) -> Recording:
     return recording
 
 
-def check_written(arguments: argparse.Namespace, *recordings: str | None, **outputs: str | None) -> None:
+def check_written(arguments: argparse.Namespace, *recordings: str | None, **outputs: str | Path | None) -> None:
     """Before anything is read: nothing is written onto the recordings, the model or the effects; `json="out.json"` is
     `--json out.json`. Raises OutputError."""
     read = [*recordings, model_path(arguments.model), arguments.effects]
     check_outputs({f"--{option}": path for option, path in outputs.items()}, read)
-
-
-def add_time_limit(parser: argparse.ArgumentParser, default: float = math.inf) -> None:
-    parser.add_argument(
-        "--time-limit", metavar="S", type=_seconds, default=default,
-        help="after so many seconds the diagnosis tries nothing more, and the best answer so far is given"
-        + (f"; default {default:g}" if math.isfinite(default) else ""),
-    )  # fmt: skip
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = math.nan
-    if not seconds > 0.0:
-        raise argparse.ArgumentTypeError(f"a time limit is a number of seconds above 0, got {text!r}")
-    return seconds
-
-
-def add_effects_option(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--effects", metavar="FILE.py", help="your own effects; the file is executed")
 
 
 def effects_of(arguments: argparse.Namespace) -> dict[str, Effect]:
@@ -67,7 +43,7 @@ def effects_of(arguments: argparse.Namespace) -> dict[str, Effect]:
     return EFFECTS | (load_effects(arguments.effects) if arguments.effects else {})
 
 
-def parse_settings(pairs: list[str]) -> dict[str, float | int | bool]:
+def parse_settings(pairs: list[str]) -> dict[str, Any]:
     """["forgetting=0.98", "m=5"] -> {"forgetting": 0.98, "m": 5}."""
     settings = {}
     for pair in pairs:

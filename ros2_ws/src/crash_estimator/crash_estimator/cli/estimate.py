@@ -1,32 +1,29 @@
 """`estimate RECORDING --model M --method mrls`: fold a recording through an estimator and print what it found."""
 
-import argparse
 import sys
 
-import numpy as np
-
 from crash_replay.fault import guarded
-from crash_replay.recording import Recording
-from crash_replay.said import Parser, say
+from crash_replay.said import Parser
 
-from ..core.derived_motion import with_accelerations
-from ..core.errors import EquationError, equation_errors
-from ..core.estimate import Description, ElementState, Estimate, ParameterStatus
-from ..core.fold import run
-from ..core.methods import METHODS, make_estimator
-from ..model_file import load_model, ready_models
-from ..tables import besides_table, error_table, known_effects_table, never_touches, parameter_table
-from .common import RECORDING, add_effects_option, check_written, effects_of, parse_settings, read_crash, write_json
+from ..core.methods import METHODS
+from .options import RECORDING, add_effects_option, add_model_option
 
 
 def main() -> None:
-    sys.exit(guarded(lambda: estimate(_parser().parse_args())))
+    sys.exit(guarded(_main))
+
+
+def _main() -> None:
+    arguments = _parser().parse_args()
+    from .work.estimate import estimate  # late: it takes long to import, and a line at fault needs none of it
+
+    estimate(arguments)
 
 
 def _parser() -> Parser:
     parser = Parser(prog="estimate", description=__doc__)
     parser.add_argument("bag", metavar="RECORDING", help=RECORDING)
-    parser.add_argument("--model", required=True, help=f"a .yaml file, or one of {', '.join(ready_models())}")
+    add_model_option(parser)
     parser.add_argument("--method", default="constrained_kalman", choices=METHODS)
     parser.add_argument("--set", nargs="*", default=[], metavar="NAME=VALUE", help="settings of the method")
     parser.add_argument(
@@ -37,85 +34,6 @@ def _parser() -> Parser:
     add_effects_option(parser)
     parser.add_argument("--json", metavar="FILE", help="write everything that was found")
     return parser
-
-
-def estimate(arguments: argparse.Namespace) -> None:
-    check_written(arguments, arguments.bag, json=arguments.json)
-    effects = effects_of(arguments)
-    structure = load_model(arguments.model, effects)
-    structure, (recording,) = with_accelerations(structure, [read_crash(arguments.bag)])
-    settings = parse_settings(arguments.set) | ({"effective_mass": True} if arguments.effective_mass else {})
-    estimator = make_estimator(structure, recording.test, arguments.method, effects=effects, **settings)
-    estimates = run(estimator, recording.samples())
-    description, errors = estimator.description, equation_errors(estimator.description, estimates)
-    if arguments.json:  # files before words: `| head` ends this at a line that nobody reads
-        write_json(arguments.json, as_json(recording, description, estimates, errors))
-    say(f"{recording.test.id}: {len(recording)} samples, model {description.model}, method {description.method}\n")
-    say(f"{parameter_table(description, estimates)}\n")
-    if known := known_effects_table(structure.effects, effects, description):
-        say(f"{known}\n")
-    say(error_table(errors))
-    for k, name in enumerate(description.elements):
-        if all(estimate.state[k] == ElementState.APART for estimate in estimates):
-            say(f"\n{never_touches(name)}")
-    if description.extra:
-        say(f"\n{besides_table(description, estimates[-1])}")
-
-
-def as_json(
-    recording: Recording, description: Description, estimates: list[Estimate], errors: list[EquationError]
-) -> dict:
-    """Final values, the errors per equation, every event and every series; units are in `units`."""
-    last = estimates[-1]
-
-    def series(field: str, names: tuple[str, ...]) -> dict:
-        values = np.array([getattr(estimate, field) for estimate in estimates])
-        return {name: values[:, k] for k, name in enumerate(names)}
-
-    return {
-        "test": recording.test.id,
-        "model": description.model,
-        "method": description.method,
-        "samples": len(recording),
-        "units": dict(zip(description.parameters, description.parameter_units))
-        | dict(zip(description.equations, description.equation_units))
-        | dict(zip(description.extra, description.extra_units)),
-        "parameters": {
-            name: {
-                "value": float(last.parameters[k]),
-                "std": float(last.std[k]),
-                "unit": description.parameter_units[k],
-                "status": ParameterStatus(last.status[k]).name.lower(),
-            }
-            for k, name in enumerate(description.parameters)
-        },
-        "besides": {
-            name: {"value": value, "std": std, "unit": unit}
-            for name, unit, value, std in zip(description.extra, description.extra_units, last.extra, last.extra_std)
-        },
-        "equations": {row.equation: row._asdict() for row in errors},
-        "events": [
-            {"number": estimate.number, "time": estimate.time_ns * 1e-9} | event._asdict()
-            for estimate in estimates
-            for event in estimate.events
-        ],
-        "series": {
-            "time": recording.time,
-            "parameters": series("parameters", description.parameters),
-            "std": series("std", description.parameters),
-            "status": series("status", description.parameters),
-            "besides": series("extra", description.extra),
-            "measured": series("measured", description.equations),
-            "predicted": series("predicted", description.equations),
-            "innovation": series("innovation", description.equations),
-            "residual": series("residual", description.equations),
-            "crush": series("crush", description.elements),
-            "rate": series("rate", description.elements),
-            "force": series("force", description.elements),
-            "force_std": series("force_std", description.elements),
-            "state": series("state", description.elements),
-        },
-    }
 
 
 if __name__ == "__main__":

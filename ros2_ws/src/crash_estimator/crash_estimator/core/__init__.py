@@ -1,0 +1,1 @@
+"""Models, estimation, validation and diagnosis: arrays in, arrays out; neither ROS nor files nor a viewer."""

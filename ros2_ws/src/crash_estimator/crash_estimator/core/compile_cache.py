@@ -14,12 +14,20 @@ from numba import config
 from numba.core.event import Event, Listener, install_listener
 
 INDEPENDENT = {"diagnosis", "effects"}
-"""Folders of the core that the compiled recursion takes nothing from."""
+"""Folders of the core that the compiled recursion takes nothing from; numba sees each change of what they compile
+but those of constants from another file."""
+CONSTANTS = ("diagnosis/parameterization/layout.py",)
+"""Files within that have such constants."""
 
 
-def _fingerprint(folder: Path) -> str:
-    sources = sorted(path for path in folder.rglob("*.py") if not INDEPENDENT & set(path.relative_to(folder).parts))
-    return hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
+def sources(core: Path) -> list[Path]:
+    """The files after whose change all is compiled anew."""
+    others = (path for path in core.rglob("*.py") if not INDEPENDENT & set(path.relative_to(core).parts))
+    return sorted([*others, *(core / name for name in CONSTANTS)])
+
+
+def _fingerprint(core: Path) -> str:
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sources(core))).hexdigest()[:16]
 
 
 _cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "crash_estimator"

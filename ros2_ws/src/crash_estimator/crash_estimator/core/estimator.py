@@ -119,7 +119,7 @@ class Estimator:
             if k not in before
         )
 
-    def _estimate(
+    def _estimate(  # noqa: PLR0913 - all that a sample's Estimate is made of
         self,
         sample: Sample,
         motion: Motion,

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple, Protocol
 
 from crash_replay.recording import Sample, Test
 
-from .compiled.estimator import CompiledEstimator
 from .effects import EFFECTS
 from .effects.applied import applied
 from .effects.channels import Corrected, known_errors
@@ -121,6 +120,8 @@ def make_estimator(
     if damping_after is not None and recipe.estimator is Estimator:
         chosen = DampingLater(chosen, damping_after)
     if compiled and structure.first_order and isinstance(chosen, (Rls, Kalman)):
+        from .compiled.estimator import CompiledEstimator  # late: numba takes long to import, and names need it not
+
         return CompiledEstimator(structure, test, chosen, method)
     return recipe.estimator(structure, test, chosen, method)
 

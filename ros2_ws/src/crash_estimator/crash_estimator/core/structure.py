@@ -7,7 +7,8 @@ crush X = x_a - x_b (compression positive), rate of crush V = dX/dt and force F 
     M_k a_k = sum over elements of delta_k F + P_k + e_k,    delta = -1 for a, +1 for b
 
 with P_k the measured force that is applied to a free body, if there is one. A free body gives one equation, divided by
-its mass so that measured, predicted and residual are in the accelerometer's m/s^2; a fixed body with a measured force gives another, in N, the force on it.
+its mass so that measured, predicted and residual are in the accelerometer's m/s^2; a fixed body with a measured force
+gives another, in N, the force on it.
 """
 
 from dataclasses import dataclass

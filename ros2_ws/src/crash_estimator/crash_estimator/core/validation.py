@@ -6,8 +6,9 @@
     all lags together         Q = N (N + 2) sum over i = 1..L of rho_rr(i)^2 / (N - i)   (Ljung and Box)
 
 p = 1.65, 1.96, 2.58 for 90, 95, 99 %. The limits hold for each lag on its own: of twenty lags of white noise one is
-beyond the 95 % limit. Whether a residual is white is therefore decided by Q, which is chi-square with L degrees
-of freedom; u are the crush and the rate of each element in the equation.
+beyond the 95 % limit. Whether a residual is uncorrelated is therefore decided by Q, which is chi-square with L degrees
+of freedom; u are the crush and the rate of each element in the equation. Such a residual is not called white: that word
+is for what passes the diagnosis's band test (`core.diagnosis.residuals.band_test`), which knows the sensors' noise.
 """
 
 from collections.abc import Sequence
@@ -26,7 +27,7 @@ NORMAL_QUANTILE = {0.90: 1.2816, 0.95: 1.6449, 0.99: 2.3263}
 """One-sided, for the chi-square quantile."""
 
 FEWEST = 20
-"""Samples below which nothing is said of whiteness."""
+"""Samples below which nothing is said of correlation."""
 
 
 class Correlation(NamedTuple):
@@ -53,7 +54,8 @@ class EquationValidation(NamedTuple):
     q: float  # Ljung and Box
     degrees: int  # L
 
-    def white(self, level: float) -> bool:
+    def uncorrelated(self, level: float) -> bool:
+        """By the test of Ljung and Box."""
         return self.auto is not None and self.q <= chi_square_quantile(level, self.degrees)
 
 
@@ -78,7 +80,7 @@ def validate(
     chosen = [e for e in estimates if start <= e.time_ns * 1e-9 <= end]
     series = np.array([getattr(e, what) for e in chosen]).reshape(len(chosen), len(description.equations))
     equations = []
-    for row, (name, unit) in enumerate(zip(description.equations, description.equation_units)):
+    for row, (name, unit) in enumerate(zip(description.equations, description.equation_units, strict=True)):
         valid = np.isfinite(series[:, row])
         inputs = {
             f"{element}.{kind}": np.array([getattr(e, kind)[k] for e in chosen])[valid]

@@ -13,7 +13,8 @@ from crash_replay.readers import is_bag, name_of, read_source
 from crash_replay.recording import Recording, RecordingError, Test
 
 from ..core.structure import ModelError, Structure
-from ..model_file import load_model, ready_models
+from ..model_file import load_model
+from ..ready_models import ready_models
 
 BUNDLED = Path("bags/hidden_effect.mcap")
 METHODS_OF_ONE_MODEL = ("mrls", "constrained_kalman")
@@ -45,8 +46,8 @@ def as_bag(source: Path, out: Path, cfc: int | str | None = None) -> tuple[Recor
     """The recording at `source`, a bag of it, and what was done to get it, in lines.
 
     A bag stays where and as it is; any other form is imported to out/NAME.mcap. `cfc`: its channel frequency class
-    of SAE J211-1, 0 for none; without it what a laboratory recorded, which is unfiltered, is filtered, each channel with
-    its own class.
+    of SAE J211-1, 0 for none; without it what a laboratory recorded, which is unfiltered, is filtered, each channel
+    with its own class.
     """
     recording = read_source(source)
     if is_bag(source):
@@ -80,7 +81,7 @@ def choose(
     doubled = next((name for name in names if names.count(name) > 1), None)
     if doubled:
         raise ModelError(f"two models are called {doubled}: give one of their files another name")
-    return [Choice(name, *pair) for name, pair in zip(names, pairs)]
+    return [Choice(name, *pair) for name, pair in zip(names, pairs, strict=False)]
 
 
 def _node_name(model: str, method: str, several_models: bool, several_methods: bool) -> str:

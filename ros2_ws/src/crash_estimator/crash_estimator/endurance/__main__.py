@@ -86,7 +86,7 @@ def is_sound(one: Endured) -> bool:
 
 
 def is_flat(one: Grown) -> bool:
-    more = [end - settled for settled, end in zip(one.settled[1:], one.end[1:])]
+    more = [end - settled for settled, end in zip(one.settled[1:], one.end[1:], strict=True)]
     return one.end.memory < (1.0 + GROWTH) * one.settled.memory and max(more) <= FEW
 
 
@@ -98,7 +98,7 @@ def method_row(one: Endured) -> list[str]:
 
 def node_row(one: Grown) -> list[str]:
     pairs = [f"{one.settled.memory / MEGABYTE:.1f} -> {one.end.memory / MEGABYTE:.1f}"]
-    pairs += [f"{settled} -> {end}" for settled, end in zip(one.settled[1:], one.end[1:])]
+    pairs += [f"{settled} -> {end}" for settled, end in zip(one.settled[1:], one.end[1:], strict=True)]
     return [one.node, f"{one.times} {one.what}", *pairs, "yes" if is_flat(one) else "NO"]
 
 
@@ -107,8 +107,8 @@ def page(methods: list[Endured], grown: list[Grown]) -> str:
     nodes_head = ["node", "through", "MB", "open files", "threads", "flat"]
     return f"""# Long runs
 
-`make endurance`: memory after a tenth of the samples, tests or passes, and at the end; a node's with that of the processes
-it starts. The covariance P is looked at every 997 samples, scaled to a diagonal of one.
+`make endurance`: memory after a tenth of the samples, tests or passes, and at the end; a node's with that of the
+processes it starts. The covariance P is looked at every 997 samples, scaled to a diagonal of one.
 
 {markdown_table(methods_head, [method_row(one) for one in methods])}
 

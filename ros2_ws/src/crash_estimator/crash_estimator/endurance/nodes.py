@@ -4,6 +4,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -127,8 +128,11 @@ def tests_in_a_row(out: Path, times: int) -> list[Grown]:
             state.publish(ReplayState(state=ReplayState.FINISHED, number=whole, total=whole))
             settles = k == round(SETTLED * times)
             everybody = settles or k % EVERY == EVERY - 1 or k == times - 1
-            through = lambda name, whole=whole: _is_through(words.word(f"/{name}"), whole)
-            g.wait(through, list(nodes if everybody else nodes.keys() - PATIENT), f"test {k} is dealt with")
+            g.wait(
+                partial(_says_it_is_through, words, whole),
+                list(nodes if everybody else nodes.keys() - PATIENT),
+                f"test {k} is dealt with",
+            )
             if settles:
                 settled = g.sizes()
         end = g.sizes()
@@ -141,7 +145,8 @@ def _send(recording: Recording, whole: int, samples, g: Graph) -> None:
         g.observer.executor.spin_once(timeout_sec=0.0)
 
 
-def _is_through(word, whole: int) -> bool:
+def _says_it_is_through(words, whole: int, name: str) -> bool:
+    word = words.word(f"/{name}")
     return word is not None and word.done and word.total == whole and not word.missing
 
 
@@ -153,9 +158,11 @@ def passes_in_a_row(out: Path, times: int) -> list[Grown]:
         "crash_replay", "replay", bag=bag, loop=True, rate=1.0, listeners=list(nodes), wait_timeout=PATIENCE
     )
     with graph(out / "passes", nodes) as g:
-        run = lambda: g.observer.state.run if g.observer.state else 0
-        began = lambda _: run() >= round(SETTLED * times)
-        g.wait(began, ["replay"], "the replay has made a tenth of its passes")
+
+        def run() -> int:
+            return g.observer.state.run if g.observer.state else 0
+
+        g.wait(lambda _: run() >= round(SETTLED * times), ["replay"], "the replay has made a tenth of its passes")
         settled, deadline = g.sizes(), time.monotonic() + PATIENCE
         while run() < times and time.monotonic() < deadline + times:
             g.wait(lambda _: True, ["replay"], "its passes")
@@ -166,5 +173,8 @@ def passes_in_a_row(out: Path, times: int) -> list[Grown]:
 
 def size_of(process: int) -> Size:
     family = [process, *children_of(process)]
-    count = lambda folder: sum(len(list(Path(f"/proc/{one}/{folder}").glob("*"))) for one in family)
+
+    def count(folder: str) -> int:
+        return sum(len(list(Path(f"/proc/{one}/{folder}").glob("*"))) for one in family)
+
     return Size(sum(resident(one) for one in family), count("fd"), count("task"))

@@ -69,7 +69,8 @@ class Follower:
         return columns
 
     def again(self, start: int, stop: int) -> Columns:
-        """The estimates of samples start, ..., stop - 1, which have been seen, once more; the follower stays where it is.
+        """The estimates of samples start, ..., stop - 1, which have been seen, once more; the follower stays where it
+        is.
 
         Raises FilterFailure.
         """

@@ -12,22 +12,32 @@ from rclpy.serialization import serialize_message
 from .valid import Files
 
 NUMBERS = (
-    "0", "-0", "-1", "1", "1e10", "-1e10", "1e30", "1e100", "1e308", "-1e308", "1e309", "1e-308", "5e-324", "nan", "inf",
-    "-inf", ".nan", ".inf", "9223372036854775807", "9223372036854775808", "-9223372036854775808", "18446744073709551615",
-    "2147483647", "2147483648", "4294967295", "0x10", "1_000", "1,5", "", " ", "true", "1" * 400, "1" * 5000, "0.1.2", "+",
+    "0", "-0", "-1", "1", "1e10", "-1e10", "1e30", "1e100", "1e308", "-1e308", "1e309", "1e-308", "5e-324", "nan",
+    "inf",
+    "-inf", ".nan", ".inf", "9223372036854775807", "9223372036854775808", "-9223372036854775808",
+    "18446744073709551615",
+    "2147483647", "2147483648", "4294967295", "0x10", "1_000", "1,5", "", " ", "true", "1" * 400, "1" * 5000, "0.1.2",
+    "+",
 )  # fmt: skip
 WORDS = (
     "", "null", "~", "true", "false", "yes", "no", "[]", "{}", "[a, a]", "{a: 1}", "[" * 50, "[" * 3000, "{a: " * 100,
-    "*none", "&a [*a]", "!!binary a", "!!python/object/apply:os.system [ls]", "!!float x", "!!timestamp 2001-99-99", "2001-01-01",
-    "\\x1b[2J", "\x1b[31m", "\x00", "\u202e", "\ud800", "\ufeff", "'", '"', "|", ">", "#", ":", "- ", "<<: *a", "? ", "%", "@", "`",
-    "x" * 200, "x" * 20_000, "ü", "名", "../../etc/passwd", "/dev/zero", "a b", "a-b", "__", "1a", "NOVALUE", "time", "car", "rib_ay",
-    "X0: &X0 [a,a,a,a,a,a,a,a,a]\nX1: &X1 [*X0,*X0,*X0,*X0,*X0,*X0,*X0,*X0,*X0]\nX2: [*X1,*X1,*X1,*X1,*X1,*X1,*X1,*X1,*X1]",
+    "*none", "&a [*a]", "!!binary a", "!!python/object/apply:os.system [ls]", "!!float x", "!!timestamp 2001-99-99",
+    "2001-01-01",
+    "\\x1b[2J", "\x1b[31m", "\x00", "\u202e", "\ud800", "\ufeff", "'", '"', "|", ">", "#", ":", "- ", "<<: *a", "? ",
+    "%", "@", "`",
+    "x" * 200, "x" * 20_000, "ü", "名", "../../etc/passwd", "/dev/zero", "a b", "a-b", "__", "1a", "NOVALUE", "time",
+    "car", "rib_ay",
+    "X0: &X0 [a,a,a,a,a,a,a,a,a]\nX1: &X1 [*X0,*X0,*X0,*X0,*X0,*X0,*X0,*X0,*X0]\n"
+    "X2: [*X1,*X1,*X1,*X1,*X1,*X1,*X1,*X1,*X1]",
     "&b [&c [&d [1,1,1,1],*d,*d,*d],*c,*c,*c,*c]",
 )  # fmt: skip
 PYTHON = (
-    "sys.exit()", "sys.exit(0)", "raise SystemExit", "1 / 0", "raise KeyError('x')", "np.nan", "None", "'x'", "[]", "{}", "object()",
-    "motion.rate[:3]", "np.full(64, np.inf)", "10.0**400", "time", "np.zeros((2, 2))", "1j * motion.rate", "lambda: 0", "5", "-1.0",
-    "[] * 3", "rate ** 0.5", "force(motion)", "float('nan')", "exit()", "np.ones(10**6)", "(yield)", "open('/nonexistent')",
+    "sys.exit()", "sys.exit(0)", "raise SystemExit", "1 / 0", "raise KeyError('x')", "np.nan", "None", "'x'", "[]",
+    "{}", "object()",
+    "motion.rate[:3]", "np.full(64, np.inf)", "10.0**400", "time", "np.zeros((2, 2))", "1j * motion.rate",
+    "lambda: 0", "5", "-1.0",
+    "[] * 3", "rate ** 0.5", "force(motion)", "float('nan')", "exit()", "np.ones(10**6)", "(yield)",
+    "open('/nonexistent')",
 )  # fmt: skip
 TOKEN = re.compile(r"[-+]?\d[\d.eE+-]*|[A-Za-z_][\w']*|[^\w\s]|\s+")
 BYTES = (b"\x00", b"\xff", b"\xff\xfe", b"\xc3\x28", b"\r", b"\n", b"\x1a", b"\x1b[2J", b"\x80" * 50)

@@ -10,8 +10,9 @@ HEAD = """# Wrong input
 Valid inputs of every kind, each spoilt in a few ways: numbers that are not finite, zero or huge, parts gone, doubled or
 swapped, lengths that lie, nesting, bombs, other bytes, pipes and folders in a file's place. They go through the very
 functions that commands and nodes take input by. Each is taken, or refused with one printable line by an error of the
-project's own; anything else is a failure, as are a warning, more than {seconds:g} s of processor and more than {most:.0f} MB in all
-(the process's libraries, a few hundred MB, counted). `make fuzz` makes this page; every failure it ever found is a test."""
+project's own; anything else is a failure, as are a warning, more than {seconds:g} s of processor and more than
+{most:.0f} MB in all (the process's libraries, a few hundred MB, counted). `make fuzz` makes this page; every failure
+it ever found is a test."""
 
 
 def page(results: Sequence[Result], seed: int) -> str:

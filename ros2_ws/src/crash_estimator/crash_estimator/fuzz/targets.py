@@ -1,4 +1,5 @@
-"""What takes input from outside: how a valid one is spoilt, and the very functions that commands and nodes take it by."""
+"""What takes input from outside: how a valid one is spoilt, and the very functions that commands and nodes take it
+by."""
 
 import json
 from collections.abc import Callable

@@ -1,0 +1,1 @@
+"""The ROS nodes: declare, convert, step, convert, publish."""

@@ -2,15 +2,17 @@
 
 from array import array
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from builtin_interfaces.msg import Time
 from crash_msgs.msg import Misfit, MisfitWindow, RankedEffect, Ranking, Revision
 from std_msgs.msg import Header
 
-from ..core.diagnosis import FitCurves, OnlineAnswer, Ranked
 from ..core.structure import EffectSpec, Structure
+
+if TYPE_CHECKING:  # an answer brings it along
+    from ..core.diagnosis import FitCurves, OnlineAnswer, Ranked
 
 
 class Moment(NamedTuple):
@@ -25,7 +27,7 @@ class Moment(NamedTuple):
     final: bool
 
 
-def ranking_message(at: Moment, answer: OnlineAnswer) -> Ranking:
+def ranking_message(at: Moment, answer: "OnlineAnswer") -> Ranking:
     before, after = answer.white
     return Ranking(
         header=Header(stamp=at.stamp, frame_id=at.structure.name),
@@ -56,14 +58,14 @@ def ranking_message(at: Moment, answer: OnlineAnswer) -> Ranking:
     )
 
 
-def misfit_message(at: Moment, answer: OnlineAnswer) -> Misfit:
+def misfit_message(at: Moment, answer: "OnlineAnswer") -> Misfit:
     windows = [MisfitWindow(start=w.start, end=w.end, body=w.body, state=w.state, rms=w.rms) for w in answer.misfit]
     model = at.structure.name
     header = Header(stamp=at.stamp, frame_id=model)
     return Misfit(header=header, run=at.run, number=at.number, model=model, windows=windows)
 
 
-def revision_message(at: Moment, model: str, number: int, stamp: Time, fit: FitCurves, rows: slice) -> Revision:
+def revision_message(at: Moment, model: str, number: int, stamp: Time, fit: "FitCurves", rows: slice) -> Revision:
     """The rows of a revision's curves; model: its name; number and stamp: of their first sample."""
     measured, predicted = fit.measured[rows], fit.predicted[rows]
     tables = {
@@ -99,7 +101,7 @@ def revision_name(given: Structure, structure: Structure, found: Sequence[Effect
     return given.name + "".join(gone + new)
 
 
-def _ranked(ranked: Ranked) -> RankedEffect:
+def _ranked(ranked: "Ranked") -> RankedEffect:
     return RankedEffect(
         effect=ranked.effect,
         target=ranked.target,

@@ -1,15 +1,10 @@
-"""`diagnosis`: says, while a test is replayed, which physical effect the model lacks, and where it fails.
-
-Subscribes to `test` and `samples` (or `channels/<name>`, from rosbag2's player); publishes `~/ranking`, `~/misfit` and
-`~/revisions` as the samples come, and after the last one the offline answer. Adding an effect, or taking one out, makes
-a new revision of its model, and the same question is asked of it on the samples that are kept.
-"""
+"""The node of `diagnosis`: what the model lacks, asked as the samples come; `diagnosis_command` says with what."""
 
 import sys
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from crash_msgs.msg import Samples, TestInfo
+from crash_msgs.msg import Ranking, Samples, TestInfo
 from rclpy.node import Node
 from rclpy.task import Future
 
@@ -24,7 +19,6 @@ from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import stamp, stamp_ns, test_from_msg
 from crash_replay.ros_runtime import run
 
-from ..core.diagnosis import UNEXPLAINED, OnlineAnswer
 from ..core.effects import EFFECTS
 from ..core.effects.user import load_effects
 from ..core.kinematics import Kinematics
@@ -34,14 +28,17 @@ from ..model_file import load_model
 from .asking import Asking
 from .catching_up import CatchingUp
 from .channel_feed import ChannelFeed
+from .diagnosis_health import diagnosis_health
 from .diagnosis_messages import Moment
 from .diagnosis_parameters import PARAMETERS, Wanted
 from .diagnosis_telling import Telling
 from .diagnosis_worker import Task, Worker, WorkerError
 from .hearing import hear
 from .model_revisions import ModelRevisions
-from .node_health import diagnosis_health
 from .samples import Received, fitting, received, rows_of, what_is_wrong
+
+if TYPE_CHECKING:  # an answer brings it along
+    from ..core.diagnosis import OnlineAnswer
 
 LOOK = 0.02
 """s of wall clock between two looks whether an answer has come."""
@@ -245,16 +242,16 @@ class DiagnosisNode(Node):
             )
         return not self.stopped
 
-    def _conclude(self, at: Moment, answer: OnlineAnswer) -> None:
+    def _conclude(self, at: Moment, answer: "OnlineAnswer") -> None:
         self.telling.tell(at, answer, self.kept, self.time_zero)
         if not at.final:
             return
         self._add_found(at, answer)
         self.attending.tell()
 
-    def _add_found(self, at: Moment, answer: OnlineAnswer) -> None:
+    def _add_found(self, at: Moment, answer: "OnlineAnswer") -> None:
         self.finals[at.revision, self.kept.missing(at.number + 1)] = answer
-        if self.adds and answer.found and answer.verdict != UNEXPLAINED:
+        if self.adds and answer.found and answer.verdict != Ranking.UNEXPLAINED:
             self.adds = False
             self.model.add(answer.found[0])
 

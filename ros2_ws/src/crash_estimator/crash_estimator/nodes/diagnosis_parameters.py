@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from crash_replay.node_parameters import NAME, Allowed
 
-from ..core.diagnosis import DEFAULT, Tolerance, tolerance_of
-from ..model_file import MODEL
+from ..ready_models import MODEL
+
+if TYPE_CHECKING:  # a table can be read without what computes
+    from ..core.diagnosis import Tolerance
 
 PARAMETERS = {
     "model": Allowed("", MODEL, needed=f"give {MODEL}"),
@@ -34,12 +36,16 @@ class Wanted(NamedTuple):
     """What may be changed while the node runs."""
 
     every_ns: int  # of the crash, between two rankings
-    tolerance: Tolerance
+    tolerance: "Tolerance | None"  # None: as it is where nobody asks for any
     seconds: float  # for the final answer
 
     @classmethod
     def from_values(cls, values: Mapping[str, Any]) -> "Wanted":
         """Raises ModelError where what is good enough is neither a rating nor a share."""
         text = values["good_enough"]
-        tolerance = tolerance_of(text) if text else DEFAULT
+        tolerance = None
+        if text:
+            from ..core.diagnosis import tolerance_of  # late: it takes long to import, and most ask for nothing
+
+            tolerance = tolerance_of(text)
         return cls(round(values["every"] * 1e9), tolerance, values["time_limit"] or math.inf)

@@ -1,11 +1,12 @@
 """A final answer told in about ten lines of a terminal."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from scipy.constants import g as G
+from crash_replay.gravity import G
 
-from ..core.diagnosis import OnlineAnswer
+if TYPE_CHECKING:  # an answer brings it along
+    from ..core.diagnosis import OnlineAnswer
 
 CANDIDATES = 3
 WINDOWS = 2
@@ -15,7 +16,7 @@ class Told(NamedTuple):
     """The final answer on one revision of the model."""
 
     name: str  # "side_dummy + coulomb_friction on door_rib"
-    answer: OnlineAnswer
+    answer: "OnlineAnswer"
 
 
 def story(revisions: Sequence[Told]) -> list[str]:

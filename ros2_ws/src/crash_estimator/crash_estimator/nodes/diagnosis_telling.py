@@ -1,5 +1,7 @@
 """What a diagnosis publishes of its answers, and logs of the final ones."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from crash_msgs.msg import Misfit, Ranking, Revision
 from rclpy.node import Node
@@ -7,11 +9,13 @@ from rclpy.node import Node
 from crash_replay.qos import SAID
 from crash_replay.ros_messages import stamp
 
-from ..core.diagnosis import OnlineAnswer
 from ..core.structure import Structure
 from ..kept import Kept
 from .diagnosis_messages import Moment, misfit_message, ranking_message, revision_message, revision_name
 from .diagnosis_story import Told, story
+
+if TYPE_CHECKING:  # an answer brings it along
+    from ..core.diagnosis import OnlineAnswer
 
 
 class Telling:
@@ -34,7 +38,7 @@ class Telling:
     def name(self, structure: Structure) -> str:
         return revision_name(self.given, structure, ())
 
-    def tell(self, at: Moment, answer: OnlineAnswer, kept: Kept, time_zero: int) -> None:
+    def tell(self, at: Moment, answer: "OnlineAnswer", kept: Kept, time_zero: int) -> None:
         """kept: the samples it rests on; time_zero: stamp of the impact, ns."""
         self.ranking_out.publish(ranking_message(at, answer))
         self.misfit_out.publish(misfit_message(at, answer))
@@ -49,7 +53,7 @@ class Telling:
         if at.final:
             self._tell_story(at, answer, kept.missing(at.number + 1))
 
-    def _tell_story(self, at: Moment, answer: OnlineAnswer, missing: int) -> None:
+    def _tell_story(self, at: Moment, answer: "OnlineAnswer", missing: int) -> None:
         self.told[at.revision] = Told(self.name(at.structure), answer)
         for line in story([told for _, told in sorted(self.told.items())]):
             self.node.get_logger().info(line)

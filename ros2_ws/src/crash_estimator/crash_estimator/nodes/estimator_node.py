@@ -1,10 +1,5 @@
-"""`estimator`: follows the replayed samples with one model and one method, and publishes what it finds.
-
-Subscribes to `test` and `samples`, or to `channels/<name>` where rosbag2's player plays the bag; publishes
-`~/parameters` and `~/residuals` by name, the same in blocks on `~/block/parameters` and `~/block/residuals`,
-`~/forces`, `~/events` and `~/state`, and answers on `answers` what it has done with.
-Several run side by side under different names (`--ros-args -r __node:=mrls`).
-"""
+"""The node of `estimator`: a model and a method that follow the replayed samples; `estimator_command` says with
+what."""
 
 import sys
 from collections.abc import Callable
@@ -37,12 +32,12 @@ from ..kept import Kept, Rows
 from .channel_feed import ChannelFeed
 from .effect_requests import with_effect
 from .estimates_again import EstimatesAgain
+from .estimator_health import estimator_health
 from .estimator_model import EstimatorModel, model_asked
 from .estimator_parameters import table_for
 from .estimator_topics import EstimatorTopics
 from .hearing import hear
 from .intake import Intake
-from .node_health import estimator_health
 from .samples import Received, fitting, received, rows_of, what_is_wrong
 
 

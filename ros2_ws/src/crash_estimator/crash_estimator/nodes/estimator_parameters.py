@@ -1,6 +1,7 @@
 """The parameters of `estimator`, and the settings of each method, with what they mean and may be."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -13,7 +14,7 @@ from ..core.estimators.kalman import Kalman
 from ..core.estimators.order_bank import OrderBank
 from ..core.estimators.rls import Rls
 from ..core.methods import METHODS
-from ..model_file import MODEL
+from ..ready_models import MODEL
 
 PARAMETERS = {
     "model": Allowed("", MODEL, needed=f"give {MODEL}"),
@@ -107,7 +108,7 @@ def table_for(given: dict[str, Any]) -> dict[str, Allowed]:
     return PARAMETERS | settings_of(method)
 
 
-def settings_in(values: dict[str, Any]) -> dict[str, Any]:
+def settings_in(values: Mapping[str, Any]) -> dict[str, Any]:
     """The settings among a node's parameters, as `make_estimator` takes them: 0 is None where that is the default."""
     settings = {name.removeprefix(PREFIX): value for name, value in values.items() if name.startswith(PREFIX)}
     for name in ("forgetting", "damping_after"):

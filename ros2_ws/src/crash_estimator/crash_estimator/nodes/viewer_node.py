@@ -1,10 +1,4 @@
-"""`viewer`: shows what the estimators say in Rerun, live, and writes it to a .rrd file.
-
-Subscribes to `test`, each estimator's `block/parameters`, `block/residuals`, `forces` and `events`, and the diagnosis'
-`ranking`, `misfit` and `revisions`. Callbacks only queue what comes; decoding, drawing and waiting for a slow screen
-happen in the recorder's own thread. What it has missed itself it asks the estimators for; what it lacks in the end it
-says on the terminal, in the file and by its exit status.
-"""
+"""The node of `viewer`: what estimators and diagnosis say goes to Rerun; `viewer_command` says with what."""
 
 import os
 import subprocess
@@ -34,16 +28,17 @@ from crash_replay.said import say
 
 from ..core.effects.applied import applied
 from ..core.structure import ModelError, Structure
-from ..model_file import load_model, ready_models
+from ..model_file import load_model
+from ..ready_models import ready_models
 from ..viewer.native import has_display, open_viewer
 from ..viewer.recorder import Recorder
 from ..viewer.sinks import Sinks
 from ..viewer.web import WebViewer
 from .effect_requests import with_effects
 from .hearing import hear
-from .node_health import viewer_health
 from .revised_estimates import RevisedEstimates
 from .viewer_account import Account
+from .viewer_health import viewer_health
 from .viewer_messages import BLOCK_OF, FINDING_OF, test_block
 from .viewer_parameters import PARAMETERS
 from .whole_estimates import WholeEstimates

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crash_replay.readers.units import G
+from crash_replay.gravity import G
 from crash_replay.recording import Recording
 from crash_replay.synthetic.curves import Curve, constant, stepped
 from crash_replay.synthetic.dummy import side_dummy_unpadded
@@ -118,10 +118,10 @@ def trials(scenario: Scenario, seeds: int) -> tuple[Truth, Iterator[Trial]]:
     def one(seed: int) -> Trial:
         readings = [
             read(sensor, signal, np.random.default_rng([seed, k]))
-            for k, (sensor, signal) in enumerate(zip(scenario.sensors, signals))
+            for k, (sensor, signal) in enumerate(zip(scenario.sensors, signals, strict=True))
         ]
         values = np.stack([reading.values for reading in readings], axis=1)
-        noise = {sensor.channel.name: reading.noise for sensor, reading in zip(scenario.sensors, readings)}
+        noise = {sensor.channel.name: reading.noise for sensor, reading in zip(scenario.sensors, readings, strict=True)}
         return Trial(Recording(exact.test, exact.time_ns, values), noise)
 
     return truth, (one(seed) for seed in range(seeds))

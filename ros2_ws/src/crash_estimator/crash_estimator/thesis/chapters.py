@@ -65,22 +65,28 @@ def chapter_4(found: list[NoiseOrders], of_the_model: list[NoiseOrders], figures
         "## 4.5.1 Noise models: p,q = 0,0 and 1,2", "",
         f"One mass, C/M = 1, 13.3 m/s, 80 samples; noise 10 sin(0.3 t) and random of variance 10. Recursive "
         f"Gauss-Newton with a memory of {GAUSS_NEWTON['memory'] * 1e3:g} ms, "
-        f"{GAUSS_NEWTON['noise_memory'] * 1e3:g} ms for the noise model; with 1,2 it goes over the record {PASSES} times, "
-        "each from the noise model that the one before ended with (5.3: \"an iterative estimation method is required\"). "
-        f"Q is Ljung and Box's over {found[0].lags} lags, a quarter of the samples, less p + q degrees of freedom; below "
+        f"{GAUSS_NEWTON['noise_memory'] * 1e3:g} ms for the noise model; with 1,2 it goes over the record {PASSES} "
+        "times, "
+        "each from the noise model that the one before ended with (5.3: \"an iterative estimation method is "
+        "required\"). "
+        f"Q is Ljung and Box's over {found[0].lags} lags, a quarter of the samples, less p + q degrees of freedom; "
+        "below "
         f"{limits[0]} (0,0) and {limits[1]} (1,2) the innovation passes for white at 95 %.", "",
         markdown_table(head, rows), "",
         "*Apart*: median over time of |difference of the two K/M| over its sigma; *within*: share of the time (from "
         f"{SETTLED * 1e3:g} ms on) within two; of two normal variables of that sigma they would be 0.67 and 95 %. "
         "*Error of K/M*: rms, 1/s^2, of about 600.", "",
-        "As in the thesis, the residual of 0,0 is far from white and both orders find the same K/M within their sigmas, "
+        "As in the thesis, the residual of 0,0 is far from white and both orders find the same K/M within their "
+        "sigmas, "
         "because the residual does not go along with the inputs.", "",
         "Which noise: in 4.5.1 the thesis adds a sine and white noise to the simulated acceleration, by its words, "
         "and says that the residual of 0,0 is autocorrelated; that the residual of 1,2 is white it does not say. "
-        "By 4.1 and 4.12 the equation error is an ARMA(p,q) process, so the last rows have the same experiment with noise "
+        "By 4.1 and 4.12 the equation error is an ARMA(p,q) process, so the last rows have the same experiment with "
+        "noise "
         "that is one. There 1,2 leaves it white. A sine plus white noise is no ARMA(1,2): it is ARMA(2,2) with all "
         "roots on the unit circle, which takes longer than 80 samples to be told. ARMA(1,2) fitted by least squares to "
-        "that noise alone, without any car, passes in 8 % of 40 repetitions of 81 samples, and the recursion with 2,2 in "
+        "that noise alone, without any car, passes in 8 % of 40 repetitions of 81 samples, and the recursion with "
+        "2,2 in "
         "about half. So with the thesis's noise 1,2 takes most of the autocorrelation away (Q, *lags in limit*), "
         "not all of it.", "",
         "![noise models](thesis/chapter_4.png)", "",
@@ -189,7 +195,11 @@ def _parameters(found: Ratios, scenario, case: str, figure: str) -> list[Panel]:
 
 def _estimated(found: Ratios) -> set[str]:
     last = found.example["mrls"].estimates[-1]
-    return {name for name, status in zip(found.example["mrls"].description.parameters, last.status) if status != 1}
+    return {
+        name
+        for name, status in zip(found.example["mrls"].description.parameters, last.status, strict=True)
+        if status != 1
+    }
 
 
 def _outputs(found: Ratios, figure: str) -> list[Panel]:
@@ -231,7 +241,9 @@ def chapter_6(found: Covariances, with_offsets: Covariances, figures: Path) -> l
     structure = load_model("side_dummy")
     description, estimates, _ = found.example
     panels = []
-    for law, element in zip(characteristics(structure, description, estimates), cases.dummy().system.elements):
+    for law, element in zip(
+        characteristics(structure, description, estimates), cases.dummy().system.elements, strict=False
+    ):
         grid = np.linspace(0.0, law.crush.max(), 200)
         truth = np.array([element.spring(x, 0.0, x) for x in grid]) * 1e-3
         index = description.elements.index(law.element)

@@ -5,6 +5,7 @@ Contrast with Rerun's dark ground (13, 13, 14) and with white is at least 3, whi
 """
 
 Color = tuple[int, int, int]
+Shaded = tuple[int, int, int, int]
 
 MEASURED: Color = (140, 140, 140)
 ESTIMATOR_COLORS: tuple[Color, ...] = (
@@ -45,4 +46,5 @@ _GREY = 150
 
 def faded(color: Color) -> Color:
     """Of what a newer revision has taken the place of."""
-    return tuple((2 * channel + 3 * _GREY) // 5 for channel in color)
+    red, green, blue = ((2 * channel + 3 * _GREY) // 5 for channel in color)
+    return red, green, blue

@@ -10,7 +10,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from .axes import Axis, text
-from .colors import GRID, INK, TITLE, Color
+from .colors import GRID, INK, TITLE, Color, Shaded
 from .loops import GRID_WIDTH
 from .pen import TIMELINE, Pen, points
 
@@ -22,13 +22,13 @@ class Drawing:
 
     def __init__(self) -> None:
         self.strips: list[Sequence[Point]] = []
-        self.strip_colors: list[Color] = []
+        self.strip_colors: list[Color | Shaded] = []
         self.radii: list[float] = []
         self.at: list[Point] = []
         self.texts: list[str] = []
         self.text_colors: list[Color] = []
 
-    def line(self, strip: Sequence[Point], color: Color, width: float = 1.0) -> None:
+    def line(self, strip: Sequence[Point], color: Color | Shaded, width: float = 1.0) -> None:
         """width: of its half, in pixels of the screen."""
         self._strip(strip, color, -width)  # Rerun's sign for pixels
 
@@ -36,7 +36,7 @@ class Drawing:
         """A thick line, in units of the drawing."""
         self._strip([start, end], color, half_height)
 
-    def _strip(self, strip: Sequence[Point], color: Color, radius: float) -> None:
+    def _strip(self, strip: Sequence[Point], color: Color | Shaded, radius: float) -> None:
         self.strips.append([(x, -y) for x, y in strip])
         self.strip_colors.append(color)
         self.radii.append(radius)

@@ -193,7 +193,9 @@ class Pass:
             cast = cast.with_member(members[name])
         if not self.shows:
             sent = [self.sent, None]  # a file has its own
-            self.shows = [Show(r, cast, self.first, self.attempt, s) for r, s in zip(self.recordings, sent)]
+            self.shows = [
+                Show(r, cast, self.first, self.attempt, s) for r, s in zip(self.recordings, sent, strict=False)
+            ]
         elif cast != self.shows[0].cast:
             for show in self.shows:
                 show.set_cast(cast)

@@ -12,8 +12,8 @@ PREDICTION = 2.5
 PARAMETER = 5.0
 """Times what a parameter has been for all but a twentieth of the time that it was known to better than its half.
 
-Beyond it a gap is left: a secant stiffness at the end of the rebound is 0 / 0. Before it is known so well, what counts is
-the first value with its standard deviation.
+Beyond it a gap is left: a secant stiffness at the end of the rebound is 0 / 0. Before it is known so well, what
+counts is the first value with its standard deviation.
 """
 FEW = 20
 FORCE = 2.0
@@ -50,7 +50,7 @@ class Limits:
     def force(self, block: ForceBlock) -> float:
         """N, what an element may carry by the accelerations measured so far; infinite where none is measured."""
         limit = 0.0
-        for k, (body, mass) in enumerate(zip(block.body, block.mass)):
+        for k, (body, mass) in enumerate(zip(block.body, block.mass, strict=True)):
             if mass > 0:  # not NaN
                 limit += mass * self._largest_of(block.estimator, f"{body}'s acceleration", block.acceleration[:, k])
         return FORCE * float(limit) or np.inf

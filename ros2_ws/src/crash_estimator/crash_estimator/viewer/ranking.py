@@ -60,7 +60,7 @@ def ranking_drawing(block: RankingBlock) -> Drawing:
     moment = "all samples" if block.final else f"up to {1e3 * block.time:.1f} ms"
     drawing.text((0.5, top + 3.0 * LINE), f"{moment}: {block.said}", TITLE)
     meanings = (("told apart", TOLD), ("a rival fits as well", CONFOUNDED), (f"weak, below {FOUND:g}", WEAK))
-    for at, (meaning, color) in zip((0.13, 0.48, 0.84), meanings):
+    for at, (meaning, color) in zip((0.13, 0.48, 0.84), meanings, strict=False):
         drawing.text((at, top + 1.7 * LINE), meaning, color)
     return drawing
 

@@ -109,7 +109,7 @@ class Revisions:
 
     def _shade_all(self, part: str, windows: Sequence[Window], since: float) -> None:
         for body in dict.fromkeys(window.body for window in windows):
-            for state, color in zip(STATES, STATE_COLORS):
+            for state, color in zip(STATES, STATE_COLORS, strict=False):
                 own = [(max(w.start, since), w.end) for w in windows if (w.body, w.state) == (body, state)]
                 own = [(start, end) for start, end in own if end > start]
                 if own:
@@ -141,13 +141,13 @@ def whiteness_drawing(blocks: list[RevisionBlock], k: int) -> Drawing:
     frame.draw(drawing)
     drawing.line([frame.at(0.0, 0.0), frame.at(LAGS, 0.0)], INK, 0.6)
     shown = dict.fromkeys((0, len(blocks) - 1))
-    for revision, shift in zip(shown, (-0.15, 0.15)):
+    for revision, shift in zip(shown, (-0.15, 0.15), strict=False):
         left = blocks[revision].residual[:, k]
         left = left[np.isfinite(left)]
         if len(left) <= LAGS or not np.ptp(left) > 0.0:
             continue
         found = autocorrelation(left, LAGS)
-        for lag, value in zip(found.lags[1:], found.values[1:]):
+        for lag, value in zip(found.lags[1:], found.values[1:], strict=True):
             stem = [frame.at(lag + shift, 0.0), frame.at(lag + shift, max(float(value), -0.5))]
             drawing.line(stem, revision_color(revision), 1.0)
         for limit in (-found.limit(0.95), found.limit(0.95)):

@@ -47,18 +47,24 @@ def tables(cast: Cast, name: str, one: Judged) -> str:
     shown = [cast.shown(e.unit) for e in errors]
     runs = {c.name: c for c in one.comparisons}
     lines = [f"**{markdown(cast.label(name))}**: what is left over after the impact", ""]
-    lines += [row("", [f"{e.equation}, {s.unit}" for e, s in zip(errors, shown)]), "|---|" + "---:|" * len(errors)]
+    lines += [
+        row("", [f"{e.equation}, {s.unit}" for e, s in zip(errors, shown, strict=True)]),
+        "|---|" + "---:|" * len(errors),
+    ]
     for title, mean, variance in (
         ("measured", "input_mean", "input_variance"),
         ("predicted", "output_mean", "output_variance"),
         ("error", "error_mean", "error_variance"),
     ):
-        cells = [(s.factor * getattr(e, mean), s.factor**2 * getattr(e, variance)) for e, s in zip(errors, shown)]
+        cells = [
+            (s.factor * getattr(e, mean), s.factor**2 * getattr(e, variance))
+            for e, s in zip(errors, shown, strict=True)
+        ]
         lines.append(row(f"{title}: mean, variance", [f"{m:.3g}, {v:.3g}" for m, v in cells]))
     for level in LEVELS:
         inside = [f"{e.auto.inside(level):.0%}" if e.auto else "–" for e in equations]
         lines.append(row(f"auto-correlation: lags within {level:.0%} limits", inside))
-    lines.append(row("white (Ljung and Box)", [_white(e) for e in equations]))
+    lines.append(row("uncorrelated (Ljung and Box)", [_uncorrelated(e) for e in equations]))
     lines.append(row("most alike / its 99 % limit", [_alike(e) for e in equations]))
     ratings = [runs[e.equation].rating if e.equation in runs else None for e in errors]
     lines.append(row("simulated freely: ISO/TS 18571", [f"{r.overall:.2f} {r.grade}" if r else "–" for r in ratings]))
@@ -66,13 +72,13 @@ def tables(cast: Cast, name: str, one: Judged) -> str:
     lines += [row("", [e.equation for e in errors]), "|---|" + "---:|" * len(errors)]
     factors = np.array([s.factor for s in shown])
     covariance = one.validation.covariance * np.outer(factors, factors)
-    for e, values, correlation in zip(errors, covariance, one.validation.correlation):
-        lines.append(row(e.equation, [f"{v:.3g} ({r:+.2f})" for v, r in zip(values, correlation)]))
+    for e, values, correlation in zip(errors, covariance, one.validation.correlation, strict=True):
+        lines.append(row(e.equation, [f"{v:.3g} ({r:+.2f})" for v, r in zip(values, correlation, strict=True)]))
     return "\n".join(lines)
 
 
-def _white(equation: EquationValidation) -> str:
-    return next((f"at {level:.0%}" for level in LEVELS if equation.white(level)), "no")
+def _uncorrelated(equation: EquationValidation) -> str:
+    return next((f"at {level:.0%}" for level in LEVELS if equation.uncorrelated(level)), "no")
 
 
 def _alike(equation: EquationValidation) -> str:
@@ -88,14 +94,17 @@ def correlation_drawing(cast: Cast, found: Mapping[str, Correlation]) -> Drawing
     frame = Frame((0.2, 0.0, 1.5, 0.9), Axis(float(first.lags[0]), lags, 10.0), Axis(-1.0, 1.0, 0.5))
     frame.draw(drawing, "lag, samples")
     drawing.line([frame.at(float(first.lags[0]), 0.0), frame.at(lags, 0.0)], INK, 0.6)
-    for level, color in zip(LEVELS, LIMIT_COLORS):
+    for level, color in zip(LEVELS, LIMIT_COLORS, strict=False):
         for limit in (-first.limit(level), first.limit(level)):
             if abs(limit) <= 1.0:
                 drawing.line([frame.at(float(first.lags[0]), limit), frame.at(lags, limit)], color, 0.6)
     for name, one in found.items():
-        line = [frame.at(float(lag), float(value)) for lag, value in zip(one.lags, np.clip(one.values, -1.0, 1.0))]
+        line = [
+            frame.at(float(lag), float(value))
+            for lag, value in zip(one.lags, np.clip(one.values, -1.0, 1.0), strict=True)
+        ]
         drawing.line(line, cast.color(name), 1.3)
-    for at, level, color in zip((0.5, 0.8, 1.1), LEVELS, LIMIT_COLORS):
+    for at, level, color in zip((0.5, 0.8, 1.1), LEVELS, LIMIT_COLORS, strict=False):
         drawing.text((at, 0.99), f"{level:.0%} limits" if level == 0.90 else f"{level:.0%}", color)
     return drawing
 

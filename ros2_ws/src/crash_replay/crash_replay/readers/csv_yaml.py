@@ -133,9 +133,10 @@ def _numbers(path: Path, line: int, columns: Sequence[str], cells: Sequence[str]
     try:
         return [float(cell) if cell.strip() else np.nan for cell in cells]
     except ValueError:
-        name, cell = next((n, c) for n, c in zip(columns, cells) if c.strip() and not _is_number(c))
+        name, cell = next((n, c) for n, c in zip(columns, cells, strict=False) if c.strip() and not _is_number(c))
         raise RecordingError(
-            f"{path}:{line}: column {limits.shown(name)}: expected a number or an empty cell, found {limits.shown(cell)}"
+            f"{path}:{line}: column {limits.shown(name)}: expected a number or an empty cell, found "
+            f"{limits.shown(cell)}"
         ) from None
 
 

@@ -124,7 +124,7 @@ def _curve(path: Path, line: int, fields: Sequence[str]) -> Curve:
         raise RecordingError(
             f"{path}:{line}: expected {len(Curve._fields)} fields in an INSTRUMENTATION record, found {len(fields)}"
         )
-    given = dict(zip(Curve._fields, (field.strip() for field in fields)))
+    given = dict(zip(Curve._fields, (field.strip() for field in fields), strict=False))
     for name, (kind, limit) in NUMERIC.items():
         given[name] = kind(_number(path, line, name, given[name], limit))
     return Curve(**given)

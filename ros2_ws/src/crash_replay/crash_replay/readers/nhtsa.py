@@ -61,8 +61,8 @@ def found(path: Path) -> bool:
 
 
 def read(path: Path, cells: bool = False, all_sensors: bool = False) -> Recording:
-    """The recording; with `cells`, the barrier's load cells are channels of their own as well; with `all_sensors`, those
-    that contradict the others of their body too.
+    """The recording; with `cells`, the barrier's load cells are channels of their own as well; with `all_sensors`,
+    those that contradict the others of their body too.
 
     Raises RecordingError where the header is at fault or no curve can be used; a curve at fault is left out.
     """
@@ -120,7 +120,7 @@ def _read_tracks(header_file: Path, header: Header) -> tuple[list[Track], list[t
     """The usable curves, and the others with the reason why they are not."""
     tracks, left_out = [], []
     vehicles = len(header.masses)
-    named = list(zip(header.curves, channel_names(header.curves, vehicles)))
+    named = list(zip(header.curves, channel_names(header.curves, vehicles), strict=True))
     for curve, name in with_progress(named, "reading curve"):
         try:
             tracks.append(_read_track(header_file, curve, name, body_of(curve, vehicles)))

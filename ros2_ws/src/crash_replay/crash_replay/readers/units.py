@@ -2,11 +2,10 @@
 
 from collections.abc import Mapping
 
+from ..gravity import G
 from ..recording import SI_UNIT, RecordingError
 from ..yaml_schema import suggestion
 
-G = 9.80665
-"""m/s^2: standard acceleration of gravity."""
 DEGREE = 0.017453292519943295
 """rad"""
 POUND_FORCE = 4.4482216152605

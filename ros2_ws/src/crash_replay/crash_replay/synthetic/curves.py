@@ -3,8 +3,6 @@
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from scipy.interpolate import PchipInterpolator
-
 
 class Curve:
     """Monotone cubic interpolation between knots, constant beyond both ends.
@@ -16,6 +14,8 @@ class Curve:
     """
 
     def __init__(self, x: Sequence[float], y: Sequence[float]):
+        from scipy.interpolate import PchipInterpolator  # late: it takes longer to import than all the rest
+
         if len(x) != len(y) or len(x) < 2:
             raise ValueError(f"a curve needs two knots or more, and as many x as y; got {len(x)} x and {len(y)} y")
         self.x, self.y = tuple(map(float, x)), tuple(map(float, y))

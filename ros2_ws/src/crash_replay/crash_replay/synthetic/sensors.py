@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.constants import g as G
 
+from ..gravity import G
 from ..recording import Channel
 
 

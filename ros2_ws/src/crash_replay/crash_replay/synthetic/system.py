@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from .forces import Law, Slip
 
@@ -17,6 +16,8 @@ class Motion:
     """Forced motion of a driven body: its velocity as a cubic spline through knots at s, m/s, steady at both ends."""
 
     def __init__(self, time: Sequence[float], velocity: Sequence[float]):
+        from scipy.interpolate import CubicSpline  # late, as in curves.py
+
         self.time, self.velocity = tuple(map(float, time)), tuple(map(float, velocity))
         self._acceleration = CubicSpline(self.time, self.velocity, bc_type="clamped").derivative()
 

@@ -7,7 +7,8 @@ multiplied by positive numbers and added to, never subtracted from.
 One array (n, n) holds the two: its row j is column j of U up to the diagonal, which has D_j in the place of U's 1, and
 zeros beyond. So the factors of a diagonal P are P itself.
 
-Bierman, Factorization Methods for Discrete Sequential Estimation (1977), chapter V; Agee and Turner (1972) for a rank of one.
+Bierman, Factorization Methods for Discrete Sequential Estimation (1977), chapter V; Agee and Turner (1972) for a rank
+of one.
 """
 
 from numba import njit

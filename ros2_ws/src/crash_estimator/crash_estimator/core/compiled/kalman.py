@@ -3,11 +3,13 @@
 The errors of the equations are independent (R2 is diagonal), so their updates may be made in turn, each with
 a scalar instead of a matrix to invert:  s = psi P psi' + r,  L = P psi' / s,  P = (I - L psi) P (I - L psi)' + L r L'.
 
-A parameter that is held has left psi, and its row of L is 0. With L = K - H, K the gain of all and H its held rows, that is
+A parameter that is held has left psi, and its row of L is 0. With L = K - H, K the gain of all and H its held rows,
+that is
 
     P = P - s K K' + s H H'
 
-the update of all, which factors take, and a square added for those that are held (Zanetti and D'Souza 2012, AAS 12-619).
+the update of all, which factors take, and a square added for those that are held (Zanetti and D'Souza 2012, AAS
+12-619).
 """
 
 import numpy as np
@@ -23,8 +25,9 @@ from .factors import add_square, observe, product_of, seen_through, widen
 def kalman_update(theta, factors, noise, gradient, target, active, lower, upper, constrained, clamped):
     """Update theta (p,) and its covariance's factors (p, p) in place by one sample of q equations.
 
-    noise (q,) variances; gradient (q, p); target (q,) measured minus known, NaN where not measured; active (p,) 1.0 where
-    estimated; lower, upper: bounds of the first of them; clamped (p,) is set to 1.0 where one is held at its bound.
+    noise (q,) variances; gradient (q, p); target (q,) measured minus known, NaN where not measured; active (p,) 1.0
+    where estimated; lower, upper: bounds of the first of them; clamped (p,) is set to 1.0 where one is held at its
+    bound.
     """
     start = theta.copy()
     prior = factors.copy()

@@ -1,0 +1,1 @@
+"""The methods of estimation, one file each; `core.methods` has their table."""

@@ -94,11 +94,11 @@ class GaussNewton:
         p, q = ((o,) * equations if isinstance(o, int) else o for o in (self.p, self.q))
         if len(p) != equations or len(q) != equations:
             raise ModelError(f"gauss_newton needs one order for each of {equations} equations, got p {p} and q {q}")
-        return list(zip(p, q))
+        return list(zip(p, q, strict=True))
 
     def extra_names(self, equations: tuple[str, ...]) -> dict[str, str]:
         """Name -> unit of `Update.extra`: the coefficients d ("ar") and a ("ma") of each equation."""
-        named = zip(equations, self.orders(len(equations)))
+        named = zip(equations, self.orders(len(equations)), strict=True)
         return {
             f"{name}.{kind}{i + 1}": "1"
             for name, (p, q) in named
@@ -120,7 +120,7 @@ class GaussNewton:
     def _begun(self, rls: RlsState) -> RlsState:
         """With the noise models known before: d, a, their covariance and the variance of eps."""
         theta, information, carried = rls.theta.copy(), rls.information.copy(), rls.carried.copy()
-        for (d, a), model in zip(self._slices(len(self.start)), self.start):
+        for (d, a), model in zip(self._slices(len(self.start)), self.start, strict=True):
             both = slice(d.start, a.stop)
             theta[d], theta[a], carried[both, both] = model.d, model.a, model.covariance
             information[both, both] = np.linalg.inv(model.covariance)
@@ -134,7 +134,7 @@ class GaussNewton:
         equations, parameters = regression.gradient.shape
         expected, filtered = self._predict(state.rls.theta, state.past, regression)
         learning = self._learning(state, regression)
-        for (d, a), learns in zip(self._slices(equations), learning):
+        for (d, a), learns in zip(self._slices(equations), learning, strict=True):
             filtered[:, d.start : a.stop] *= learns
         theta, n = state.rls.theta[:parameters], filtered.shape[1]
         linear = regression.gradient @ theta - filtered @ state.rls.theta
@@ -193,7 +193,7 @@ class GaussNewton:
         covariance = self._rls(equations)._covariance(state.rls)
         return [
             NoiseModel(state.rls.theta[d], state.rls.theta[a], covariance[d.start : a.stop, d.start : a.stop], float(v))
-            for (d, a), v in zip(self._slices(equations), state.rls.residual_variance)
+            for (d, a), v in zip(self._slices(equations), state.rls.residual_variance, strict=True)
         ]
 
     def _predict(
@@ -204,15 +204,15 @@ class GaussNewton:
         expected, filtered = np.zeros(equations), np.zeros((equations, len(theta)))
         filtered[:, :parameters] = regression.gradient
         for k, (d, a) in enumerate(self._slices(equations)):
-            for i, then in zip(range(d.start, d.stop), past):
+            for i, then in zip(range(d.start, d.stop), past, strict=False):
                 error = np.nan_to_num(then.target[k] - then.gradient[k] @ theta[:parameters])
                 expected[k] -= theta[i] * error
                 filtered[k, :parameters] += theta[i] * then.gradient[k] * ~np.isnan(then.target[k])
                 filtered[k, i] -= error
-            for j, then in zip(range(a.start, a.stop), past):
+            for j, then in zip(range(a.start, a.stop), past, strict=False):
                 expected[k] += theta[j] * then.error[k]
                 filtered[k, j] += then.error[k]
-            for j, then in zip(range(a.start, a.stop), past):
+            for j, then in zip(range(a.start, a.stop), past, strict=False):
                 filtered[k] -= theta[j] * then.filtered[k]
         return expected, filtered
 

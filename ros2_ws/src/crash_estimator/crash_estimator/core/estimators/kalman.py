@@ -11,9 +11,9 @@ products is that of columns beside one another, and turned into as few columns a
 The process noise R1 follows the crush, because stiffness is a function of crush: the variance grows by
 (drift theta)^2 for each e-fold of crush, and not at all while nothing moves. R2 starts from the noise
 before the impact (or the model's `noise`) and adapts:  E[residual innovation] = R2  holds for any gain that
-is optimal, so its running mean over `noise_memory` estimates what the model cannot follow as well. It does not fall below
-the noise before the impact, or where that is not known below QUIETEST: a stiffness that drifts as fast as the samples come
-follows each of them exactly, and then R2 would shrink to the rounding of the measurement.
+is optimal, so its running mean over `noise_memory` estimates what the model cannot follow as well. It does not fall
+below the noise before the impact, or where that is not known below QUIETEST: a stiffness that drifts as fast as the
+samples come follows each of them exactly, and then R2 would shrink to the rounding of the measurement.
 
 Crush is integrated twice from accelerations whose zero is known no better than the mean of n noisy samples, so
 that a stiff element's force is wrong by K b t^2 / 2. With `offsets` these errors b, one for each measured body, are
@@ -21,8 +21,8 @@ estimated with theta, from 0 and within what the pre-impact noise lets them be:
 
     y = Psi theta + H b + e,    b ~ (0, noise / n)
 
-Without them a stiffness bends to explain b, and its sigma is too small; to consider b (Schmidt) and leave it unestimated
-keeps the sigma right, but leaves K b t^2 / 2 in the residual.
+Without them a stiffness bends to explain b, and its sigma is too small; to consider b (Schmidt) and leave it
+unestimated keeps the sigma right, but leaves K b t^2 / 2 in the residual.
 """
 
 from dataclasses import dataclass
@@ -76,7 +76,7 @@ class Kalman:
         always = np.ones(len(offsets), dtype=bool)
         prior = np.hstack([root, self._walk(theta, regression, len(offsets))])
         target = regression.measured - regression.known
-        equations = [(psi, y, r) for psi, y, r in zip(gradient, target, noise) if not np.isnan(y)]
+        equations = [(psi, y, r) for psi, y, r in zip(gradient, target, noise, strict=True) if not np.isnan(y)]
 
         def assimilate(theta: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             """The equations' errors are independent, so they update in turn, each with a scalar to divide by."""

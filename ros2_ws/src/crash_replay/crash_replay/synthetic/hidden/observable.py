@@ -22,9 +22,8 @@ Left out, because no method could name them from what is recorded:
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.constants import g as G
-from scipy.integrate import cumulative_trapezoid
 
+from ...gravity import G
 from ..curves import Curve
 from ..integrate import simulate
 from ..scenario import signals_of
@@ -123,7 +122,7 @@ def distance(specimen: Specimen, other: Specimen, besides: str = "") -> float:
     besides: a channel that is left out.
     """
     total = 0.0
-    for ours, theirs in zip(_recorded(specimen), _recorded(other)):
+    for ours, theirs in zip(_recorded(specimen), _recorded(other), strict=True):
         total += sum(np.sum((ours[c] - theirs[c]) ** 2) for c in (ours.keys() & theirs.keys()) - {besides})
     return float(np.sqrt(total * specimen.scenario.rate / COARSE_RATE))
 
@@ -172,6 +171,8 @@ def _driving(specimen: Specimen, channel: str) -> Sensor | None:
 
 def _driven_as_recorded(bare: Specimen, sensor: Sensor) -> Specimen:
     """The specimen as a model would have it that takes a wrong channel for its body's motion."""
+    from scipy.integrate import cumulative_trapezoid  # late: it takes longer to import than all the rest
+
     motion, step = bare.body(sensor.of).motion, 1.0 / COARSE_RATE
     time = np.arange(0.0, bare.scenario.duration + step, step)
     seen = np.where(time >= sensor.delay, motion.acceleration(time - sensor.delay), 0.0)
@@ -188,5 +189,5 @@ def _recorded(specimen: Specimen) -> list[dict[str, np.ndarray]]:
     runs = []
     for speed in SPEEDS:
         signals = signals_of(scenario.system.at_speed(speed), sensors, time, COARSE_STEP)
-        runs.append({s.channel.name: x / NOISE[s.channel.quantity] for s, x in zip(sensors, signals)})
+        runs.append({s.channel.name: x / NOISE[s.channel.quantity] for s, x in zip(sensors, signals, strict=True)})
     return runs

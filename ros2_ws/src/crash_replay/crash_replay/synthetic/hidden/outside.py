@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter, ss2tf
 
 from ..integrate import simulate
 from .specimen import COARSE_RATE, COARSE_STEP, Specimen
@@ -23,6 +22,8 @@ def rotation(specimen, peaks, target, share, rng):
     channel = _channel_of(specimen, target)
 
     def distortion(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
+        from scipy.signal import lfilter  # late: it takes longer to import than all the rest
+
         a = np.array([[0.0, 1.0], [-(pulsation**2), -2.0 * damping * pulsation]])
         b, c = np.array([[0.0], [share / lever]]), np.array([a[1], [0.0, 1.0]])
         d = np.array([[share / lever], [0.0]])
@@ -92,5 +93,7 @@ def _channel_of(specimen: Specimen, body: str) -> str:
 
 def _discrete(a, b, c, d, dt: float):
     """Transfer functions of a state-space model whose input goes straight between samples."""
+    from scipy.signal import cont2discrete, ss2tf
+
     ad, bd, cd, dd, _ = cont2discrete((a, b, c, d), dt, method="foh")
     return ss2tf(ad, bd, cd, dd)

@@ -114,7 +114,7 @@ def _short(value: float) -> float:
     return float(f"{value:.4g}")
 
 
-def _specimen(
+def _specimen(  # noqa: PLR0913 - the parts that a structure is told by
     rng: np.random.Generator, name: str, bodies: tuple[Body, ...], parts: tuple[Part, ...], axis: str, duration: float,
     host: str, pairs: tuple[tuple[str, str], ...] = (), stop: tuple[str, float] | None = None,
     measured: tuple[Sensor, ...] = (),
@@ -124,7 +124,7 @@ def _specimen(
     barrier = [b.name for b in bodies if b.name == "barrier"]
     sensors = [accelerometer(f"{b.name}_a{axis}", b.name) for b in moving]
     sensors += [load_cell_barrier(f"{b}_f{axis}", b) for b in barrier]
-    elements, told = zip(*(_element(rng, part) for part in parts))
+    elements, told = zip(*(_element(rng, part) for part in parts), strict=True)
     scenario = Scenario(
         name, f"Simulated: {STRUCTURES[name].__doc__.rstrip('.')}", System(bodies, tuple(elements)),
         (*sensors, *measured), duration, max_step=STEP,
@@ -132,7 +132,9 @@ def _specimen(
     model = {
         "name": name,
         "bodies": {b.name: _model_body(b, axis, bool(measured)) for b in bodies},
-        "elements": {e.name: model_element(e, t, part.stiffness) for e, t, part in zip(elements, told, parts)},
+        "elements": {
+            e.name: model_element(e, t, part.stiffness) for e, t, part in zip(elements, told, parts, strict=True)
+        },
     }
     if measured:
         displacement, velocity = (sensor.channel.name for sensor in measured)

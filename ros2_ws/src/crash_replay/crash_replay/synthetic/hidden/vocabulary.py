@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.constants import g as G
 
+from ...gravity import G
 from ..forces import Slip
 from ..sensors import accelerometer
 from ..system import Body, Element

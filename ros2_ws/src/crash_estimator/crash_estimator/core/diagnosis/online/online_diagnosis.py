@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from time import process_time
 
 import numpy as np
-from scipy.constants import g as G
 
+from crash_replay.gravity import G
 from crash_replay.recording import Recording, Test
 
 from ...effects import EFFECTS

@@ -28,7 +28,9 @@ class Builder:
 
     def add(self, name: str, start: float, std: float, mean=0.0, low=-np.inf, high=np.inf) -> int:
         for column, item in zip(
-            (self.names, self.start, self.std, self.mean, self.low, self.high), (name, start, std, mean, low, high)
+            (self.names, self.start, self.std, self.mean, self.low, self.high),
+            (name, start, std, mean, low, high),
+            strict=True,
         ):
             column.append(item)
         return len(self.start) - 1

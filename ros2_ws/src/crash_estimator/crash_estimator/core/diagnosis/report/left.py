@@ -79,7 +79,10 @@ def band_of(model: Model) -> int | None:
     for cfc in sorted(CFC_CLASSES):
         if period * cfc * RATE_PER_CFC > 1.0:
             return None
-        kept = [_kept(each, record.period, cfc) for each, record in zip(model.residuals.predicted, model.records)]
+        kept = [
+            _kept(each, record.period, cfc)
+            for each, record in zip(model.residuals.predicted, model.records, strict=True)
+        ]
         if min(kept) > SPOKEN_FOR:
             return cfc
     return None

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from scipy.constants import g as G
+from crash_replay.gravity import G
 
 from ..selection.fitted_model import Model
 from ..selection.thresholds import THRESHOLDS

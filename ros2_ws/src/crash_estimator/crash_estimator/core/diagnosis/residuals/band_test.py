@@ -6,6 +6,7 @@ degrees of freedom. A missing effect leaves its power in a few low bands, where 
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -57,7 +58,7 @@ def band_test(residuals, noise_samples, periods) -> BandTest:
     """residuals: per record (n, q) in standard deviations of the noise, NaN where not valid; noise_samples (q,) per
     record; periods: s between samples, per record."""
     found = []
-    for r, (residual, samples, period) in enumerate(zip(residuals, noise_samples, periods)):
+    for r, (residual, samples, period) in enumerate(zip(residuals, noise_samples, periods, strict=True)):
         for q in range(residual.shape[1]):
             z = residual[:, q]
             power, bands = _bands(z[np.isfinite(z)], period, EDGES)
@@ -76,7 +77,7 @@ def band_test_of_fit(records: Sequence[Sequence[Absorbed]], noise_samples) -> Ba
     distribution of m / v chi^2 with v = m^2 / tr C_B^2 degrees of freedom (Satterthwaite).
     """
     found = []
-    for r, (outputs, samples) in enumerate(zip(records, noise_samples)):
+    for r, (outputs, samples) in enumerate(zip(records, noise_samples, strict=True)):
         for q, one in enumerate(outputs):
             power, bands = _bands(one.residual, one.period, ABSORBING)
             root = dct(one.root, norm="ortho", axis=0)
@@ -94,7 +95,7 @@ def _bands(z: np.ndarray, period: float, edges: Sequence[float]):
     """Power of the cosine transform, and the bands (low, high, coefficients inside) that have any."""
     power = dct(np.clip(z, -CLIP, CLIP), norm="ortho") ** 2
     frequency = np.arange(len(z)) / (2.0 * len(z) * period)
-    bands = [(low, high, (frequency >= low) & (frequency < high)) for low, high in zip(edges, edges[1:])]
+    bands = [(low, high, (frequency >= low) & (frequency < high)) for low, high in pairwise(edges)]
     return power, [band for band in bands if band[2].any()]
 
 

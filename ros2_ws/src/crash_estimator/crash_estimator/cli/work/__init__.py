@@ -1,0 +1,1 @@
+"""What the commands do once their lines are understood, one file each."""
