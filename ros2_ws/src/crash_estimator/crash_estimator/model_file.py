@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
+from pydantic import AliasChoices, BaseModel, ConfigDict, Field, StrictBool, model_validator
 
 from crash_replay.limits import MASS, NUMBER, Range
 from crash_replay.yaml_schema import Text, number, read_yaml
@@ -180,7 +180,10 @@ class EffectPart(Part):
     host: Text | None = None
     touches: Text | None = None
     taken_from: Text | None = None
-    variant: Literal["", "absolute", "one_way", "one_way_back"] = ""
+    form: Literal["", "absolute", "one_way", "one_way_back"] = Field(
+        "",
+        validation_alias=AliasChoices("form", "variant"),  # as files written before have it
+    )
 
     @model_validator(mode="after")
     def _one_target(self):
@@ -192,7 +195,7 @@ class EffectPart(Part):
     def effect(self) -> EffectSpec:
         target = self.element or self.body or self.channel or "-".join(self.between)
         return EffectSpec(
-            self.type, target, self.coefficient, self.shape, self.host, self.touches, self.taken_from, self.variant
+            self.type, target, self.coefficient, self.shape, self.host, self.touches, self.taken_from, self.form
         )
 
 

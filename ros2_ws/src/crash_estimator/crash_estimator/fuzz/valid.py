@@ -155,7 +155,7 @@ effects:
   - {type: coulomb_friction, element: car_engine, coefficient: 1810, shape: {speed: 0.1}}
   - {type: added_mass, body: car}
   - {type: channel_gain, channel: engine_ax, coefficient: 0.02}
-  - {type: load_path, between: [car, engine], coefficient: 1.0e4, variant: one_way}
+  - {type: load_path, between: [car, engine], coefficient: 1.0e4, form: one_way}
 """
 }
 EFFECT: Files = {

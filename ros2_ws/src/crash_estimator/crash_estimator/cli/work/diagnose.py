@@ -73,6 +73,6 @@ def _entry(spec: EffectSpec, effect: Effect, bodies: list[str]) -> CommentedMap:
         entry["coefficient"] = float(f"{spec.coefficient:.6g}")
     if spec.shape:
         entry["shape"] = {name: float(f"{value:.6g}") for name, value in spec.shape.items()}
-    more = ("host", "touches", "taken_from", "variant")
-    entry.update({name: value for name in more if (value := getattr(spec, name))})
+    more = {"host": spec.host, "touches": spec.touches, "taken_from": spec.taken_from, "form": spec.variant}
+    entry.update({name: value for name, value in more.items() if value})
     return entry
