@@ -61,7 +61,7 @@ def ranking_table(ranking: Sequence[Ranked]) -> str:
 def _row(ranked: Ranked) -> tuple[str, ...]:
     return (
         ranked.name,
-        f"{ranked.coefficient:.4g}",
+        f"{ranked.coefficient:.4g}" if np.isfinite(ranked.coefficient) else "none",
         f"{ranked.std:.2g}" if np.isfinite(ranked.std) else "",
         ranked.unit,
         f"{ranked.evidence:.1f}" + ("" if ranked.fitted else " ?"),
