@@ -53,7 +53,7 @@ def write_messages(path, recording, topics, zero=SECOND, test=True):
             writer.write(connection, zero, encode_test(recording, zero))
         for name, type_name, stamps, messages in topics:
             connection = writer.add_connection(name, type_name, typestore=typestore())
-            for stamp, message in zip(stamps, messages, strict=True):
+            for stamp, message in zip(stamps, messages):
                 writer.write(connection, int(stamp), message)
     return path
 

@@ -61,7 +61,7 @@ def write_two_cars(folder, number: int = 7292, records=None):
     lines += ["----- INSTRUMENTATION -----"]
     for record, values in two_cars() if records is None else records:
         lines.append(record)
-        rows = (f"{t:.5f}\t{v:.5f}" for t, v in zip(TIME, values, strict=True))
+        rows = (f"{t:.5f}\t{v:.5f}" for t, v in zip(TIME, values))
         (folder / f"v{number:05d}.{int(record.split('|')[1]):03d}").write_text("\n".join(rows) + "\n")
     (folder / f"v{number:05d}.EV5").write_text("\r\n".join([*lines, "----- END -----"]), encoding="latin-1")
     return folder

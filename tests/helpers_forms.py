@@ -36,7 +36,7 @@ def every_form(folder, monkeypatch) -> dict[str, str]:
     monkeypatch.setenv("CRASH_CACHE", str(folder / "cache"))
     _isomme(folder / "mme", recording, car, barrier)
     typed = [folder / "a.mcap", folder / "b", folder / "c.csv", folder / "cache/v00099", folder / "mme", "nhtsa:99"]
-    return dict(zip(FORMS, map(str, typed), strict=True))
+    return dict(zip(FORMS, map(str, typed)))
 
 
 def _ev5(folder, recording, car, barrier) -> None:

@@ -70,7 +70,7 @@ def enveloped(results) -> bytes:
 def rows_of(folder: Path, number: int) -> list[dict[str, str]]:
     lines = (folder / f"v{number:05d}.EV5").read_text(encoding="latin-1").splitlines()
     start = next(k for k, line in enumerate(lines) if "INSTRUMENTATION" in line)
-    return [dict(zip(INSTRUMENTATION, line.split("|"), strict=True)) for line in lines[start + 1 :] if "|" in line]
+    return [dict(zip(INSTRUMENTATION, line.split("|"))) for line in lines[start + 1 :] if "|" in line]
 
 
 def metadata_of(folder: Path, number: int) -> dict:

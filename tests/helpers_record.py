@@ -76,7 +76,7 @@ class Estimator(Listener):
 
     def _on_samples(self, message) -> None:
         super()._on_samples(message)
-        for kind, publisher in zip(self.kinds, getattr(self, "out", []), strict=True):
+        for kind, publisher in zip(self.kinds, getattr(self, "out", [])):
             if message.number < self.silent_from:
                 publisher.publish(kind(run=message.run, number=message.number, time_ns=message.time_ns))
         self.next = message.number + len(message.time_ns)

@@ -56,7 +56,7 @@ def simulate(n: int = 1500, pre: int = 100, seed: int = 0) -> Crash:
         if t >= 0:
             middle = state + 0.5e-4 * _derivative(state)
             state = state + 1e-4 * _derivative(middle)
-    crush, force, states = (np.array(column) for column in zip(*rows, strict=True))
+    crush, force, states = (np.array(column) for column in zip(*rows))
     truth = np.column_stack([_accelerations(force), force[:, 0] + force[:, 1]])
     measured = truth + NOISE * np.random.default_rng(seed).standard_normal(truth.shape)
     displacement, velocity = (np.column_stack([half, np.zeros(n)]) for half in (states[:, :2], states[:, 2:]))
@@ -149,7 +149,7 @@ def events(crash: Crash, estimator: str, run: int = 0) -> list[EventBlock]:
 
 def two_streams(crash: Crash, size: int = 50) -> dict[str, list[Block]]:
     """Blocks of two estimators, one starting 30 % too stiff, one 20 % too soft."""
-    settings = zip(NAMES, (0.3, -0.2), (1, 2), strict=True)
+    settings = zip(NAMES, (0.3, -0.2), (1, 2))
     return {name: estimates(crash, name, error, size=size, seed=seed) for name, error, seed in settings}
 
 
@@ -208,14 +208,14 @@ def column(path: Path, entity: str, component: str) -> tuple[np.ndarray, list[np
         if chunk.entity_path == entity and not chunk.is_static:
             batch = chunk.to_record_batch()
             times = batch.column("crash_time").cast("int64").to_pylist()
-            rows_ += zip(times, values_of(batch, component), strict=True)
+            rows_ += zip(times, values_of(batch, component))
     rows_.sort(key=lambda row: row[0])
     return np.array([time_ns for time_ns, _ in rows_]), [values for _, values in rows_]
 
 
 def values_of(batch, component: str) -> list[np.ndarray]:
     """Flat values in each row of a record batch; none where it has no such component."""
-    for field, data in zip(batch.schema, batch.columns, strict=True):
+    for field, data in zip(batch.schema, batch.columns):
         if (field.metadata or {}).get(b"rerun:component") == component.encode():
             return [np.ravel(row) for row in data.to_pylist()]
     return []

@@ -63,7 +63,7 @@ def test_every_command_takes_every_form(forms, tmp_path, monkeypatch, capsys):
         ):
             came.clear()
             with monkeypatch.context() as patched:
-                patched.setattr(command, function, stop)
+                patched.setattr(f"crash_estimator.cli.work.{command.__name__.rpartition('.')[2]}.{function}", stop)
                 assert run(patched, command, *arguments) == 1
             assert "Enough" in capsys.readouterr().err and came, (form, command.__name__)
         assert import_main([forms[form], "--to", str(tmp_path / "again.mcap"), "--force"]) == 0, form

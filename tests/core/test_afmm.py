@@ -36,7 +36,7 @@ def test_a_bank_of_one_is_its_member():
     bank = make_estimator(
         oscillator(**BOTH), recording.test, "afmm", models=1, interval=0, noise_memory=0, constrained=True
     )
-    for a, b in zip(alone, run(bank, recording.samples()), strict=True):
+    for a, b in zip(alone, run(bank, recording.samples())):
         assert_allclose(b.parameters, a.parameters, rtol=1e-12)
         assert_allclose(b.covariance, a.covariance, rtol=1e-12)
         assert_allclose(b.residual, a.residual, rtol=1e-9, atol=1e-9)
@@ -130,7 +130,7 @@ def test_split_runs_are_whole_runs():
     state = estimator.init()
     for sample in samples[:333]:
         state, _ = estimator.step(state, sample)
-    for sample, expected in zip(samples[333:], whole[333:], strict=True):
+    for sample, expected in zip(samples[333:], whole[333:]):
         state, estimate = estimator.step(state, sample)
         assert_array_equal(estimate.parameters, expected.parameters)
         assert estimate.events == expected.events

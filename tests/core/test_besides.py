@@ -84,7 +84,7 @@ def test_json_and_table_have_it(found, tmp_path):
     content = json.loads((tmp_path / "found.json").read_text())
     assert tuple(content["besides"]) == tuple(content["series"]["besides"]) == description.extra
     table = besides_table(description, estimates[-1])
-    for name, unit in zip(description.extra, description.extra_units, strict=True):
+    for name, unit in zip(description.extra, description.extra_units):
         assert content["besides"][name]["unit"] == content["units"][name] == unit
         assert len(content["series"]["besides"][name]) == len(recording)
         assert name in table or np.isnan(estimates[-1].extra[description.extra.index(name)])

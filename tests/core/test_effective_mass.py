@@ -94,7 +94,7 @@ def test_as_a_first_stage_the_stiffness_is_that_of_the_true_masses():
     light = replace(model, bodies=tuple(replace(b, mass=b.mass and 0.9 * b.mass) for b in model.bodies))
     estimator = make_estimator(light, recording.test, "effective_mass")
     last = run(estimator, recording.samples())[-1]
-    mended = with_effective_masses(light, dict(zip(estimator.description.parameters, last.parameters, strict=True)))
+    mended = with_effective_masses(light, dict(zip(estimator.description.parameters, last.parameters)))
     assert_allclose([b.mass for b in mended.bodies if b.mass], [1400.0, 350.0], rtol=1e-4)
     with pytest.raises(ModelError, match="effective mass of cab came out as -3 kg"):
         with_effective_masses(light, {"cab.mass": -3.0})
@@ -120,7 +120,7 @@ def test_it_conforms():
     samples, state = list(recording.samples()), estimator.init()
     for sample in samples[:333]:
         state, _ = estimator.step(state, sample)
-    for sample, expected in zip(samples[333:], whole[333:], strict=True):
+    for sample, expected in zip(samples[333:], whole[333:]):
         state, estimate = estimator.step(state, sample)
         assert_array_equal(estimate.parameters, expected.parameters)
         assert_array_equal(estimate.covariance, estimate.covariance.T)

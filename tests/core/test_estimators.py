@@ -142,7 +142,7 @@ class TestConformance:
         copy = recording.values.copy()
         first, second = estimates_of(method, recording), estimates_of(method, recording)
         assert_array_equal(recording.values, copy)
-        for a, b in zip(first, second, strict=True):
+        for a, b in zip(first, second):
             assert_array_equal(a.parameters, b.parameters)
             assert_array_equal(a.covariance, b.covariance)
 
@@ -158,7 +158,7 @@ class TestConformance:
         for sample in samples[200:300]:
             state, _ = estimator.step(state, sample)
         state = kept
-        for sample, expected in zip(samples[200:], whole[200:], strict=True):
+        for sample, expected in zip(samples[200:], whole[200:]):
             state, estimate = estimator.step(state, sample)
             assert_array_equal(estimate.parameters, expected.parameters)
             assert_array_equal(estimate.covariance, expected.covariance)

@@ -34,7 +34,7 @@ def update(theta, factors, noise, psi, target, active):
 
 def joseph(theta, covariance, noise, psi, target, active):
     """The update as it is written, in the numbers given: of all equations in turn, of the active parameters."""
-    for row, y, r in zip(psi, target, noise, strict=True):
+    for row, y, r in zip(psi, target, noise):
         seen = row * active
         gain = active * (covariance @ seen) / (r + seen @ covariance @ seen)
         lessen = np.eye(len(theta), dtype=int) - np.outer(gain, seen)

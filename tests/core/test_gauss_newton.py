@@ -40,7 +40,7 @@ def test_without_a_noise_model_it_is_rls_to_the_last_bit(settings):
     newton = run(
         make_estimator(oscillator(**BOTH), recording.test, "gauss_newton", p=0, q=0, **settings), recording.samples()
     )
-    for a, b in zip(plain, newton, strict=True):
+    for a, b in zip(plain, newton):
         for field in ("parameters", "covariance", "innovation", "residual", "innovation_covariance"):
             assert_array_equal(getattr(a, field), getattr(b, field))
 
@@ -95,7 +95,7 @@ def test_it_finds_the_noise_model_and_leaves_a_white_error():
     model = estimator.method.noise_models(state.method)[0]
     assert estimator.description.extra == ("block.ar1", "block.ma1")
     assert extra == (model.d[0], model.a[0])
-    for found, true, variance in zip((*model.d, *model.a), (-0.8, 0.5), np.diag(model.covariance), strict=True):
+    for found, true, variance in zip((*model.d, *model.a), (-0.8, 0.5), np.diag(model.covariance)):
         assert abs(found - true) < 3.0 * np.sqrt(variance)
         assert np.sqrt(variance) < 0.05
     settled = np.array(innovations[1000:])
@@ -193,6 +193,6 @@ def test_a_bank_of_one_order_is_that_estimator():
     recording = oscillator_recording(noise=5.0)
     bank = make_estimator(oscillator(**BOTH), recording.test, "gauss_newton_orders", largest=0)
     alone = make_estimator(oscillator(**BOTH), recording.test, "gauss_newton", p=0, q=0)
-    for a, b in zip(run(bank, recording.samples()), run(alone, recording.samples()), strict=True):
+    for a, b in zip(run(bank, recording.samples()), run(alone, recording.samples())):
         assert_array_equal(a.parameters, b.parameters)
         assert_array_equal(a.covariance, b.covariance)

@@ -53,7 +53,7 @@ def test_until_they_are_known_nothing_differs(recording):
     structure = load_model("frontal_engine_cab")
     plain = make_estimator(structure, recording.test, "mrls")
     staged = make_estimator(structure, recording.test, "mrls", effective_mass=True)
-    for a, b in zip(run(plain, recording.samples()), run(staged, recording.samples()), strict=True):
+    for a, b in zip(run(plain, recording.samples()), run(staged, recording.samples())):
         if any(event.kind == "masses" for event in b.events):
             break
         assert_array_equal(a.parameters, b.parameters)
@@ -72,7 +72,7 @@ def test_a_kept_state_goes_on_as_if_never_left(recording):
     for sample in samples[1000:1400]:
         state, _ = estimator.step(state, sample)
     state = kept
-    for sample, expected in zip(samples[1000:], whole[1000:], strict=True):
+    for sample, expected in zip(samples[1000:], whole[1000:]):
         state, estimate = estimator.step(state, sample)
         assert_array_equal(estimate.parameters, expected.parameters)
 

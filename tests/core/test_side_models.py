@@ -53,7 +53,7 @@ def test_the_dummys_half_moves_and_carries_as_in_the_whole():
     dummy, _, half = steps("side_dummy", recording)
     names = [element.name for element in whole.elements]
     index = [names.index(element.name) for element in dummy.elements]
-    for a, b in zip(all_of_it, half, strict=True):
+    for a, b in zip(all_of_it, half):
         assert_allclose(b.crush, a.crush[index], atol=1e-12)
         assert_allclose(b.rate, a.rate[index], atol=1e-12)
     assert any(event.kind == "loading" and event.target == "door_rib" for e in half for event in e.events)

@@ -37,9 +37,9 @@ def test_correlations_are_those_of_their_definition():
     r, u = random.standard_normal(50), random.standard_normal(50)
     r, u = r - r.mean(), u - u.mean()
     auto, cross = autocorrelation(r, 5), cross_correlation(r, u, 5)
-    for lag, value in zip(auto.lags, auto.values, strict=True):
+    for lag, value in zip(auto.lags, auto.values):
         assert_allclose(value, np.sum(r[lag:] * r[: 50 - lag]) / np.sum(r * r), atol=1e-12)
-    for lag, value in zip(cross.lags, cross.values, strict=True):
+    for lag, value in zip(cross.lags, cross.values):
         later, earlier = (r[lag:], u[: 50 - lag]) if lag >= 0 else (r[:lag], u[-lag:])
         assert_allclose(value, np.sum(later * earlier) / np.sqrt(np.sum(r * r) * np.sum(u * u)), atol=1e-12)
 

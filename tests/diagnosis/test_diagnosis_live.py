@@ -98,7 +98,7 @@ def test_the_error_is_that_of_all_samples_and_falls_to_the_noise_with_what_was_f
 
 def test_misfit_and_curves_are_of_the_samples_so_far(damped, said):
     recording = damped[2]
-    for answer, end in zip(said[-3:], np.arange(EVERY, recording.time[-1] + EVERY, EVERY)[-3:], strict=True):
+    for answer, end in zip(said[-3:], np.arange(EVERY, recording.time[-1] + EVERY, EVERY)[-3:]):
         seen = so_far(recording, end)
         after = seen.time_ns >= 0
         for curves in answer.fits:

@@ -144,7 +144,7 @@ def test_each_revision_has_its_curves(stage, case, offline):
     first = int(np.flatnonzero(after)[0])
     final = [m for m in messages if m.final][:2]
     assert [m.model for m in final] == ["side", "side + viscous_damping on door_car"]
-    for message, fitted in zip(final, offline.models, strict=True):
+    for message, fitted in zip(final, offline.models):
         assert message.number == first
         assert_array_equal(message.time_ns, case[2].time_ns[after])
         record, predicted = fitted.records[0], fitted.residuals.predicted[0]
@@ -259,8 +259,8 @@ def test_rosbag2s_player_feeds_it_too(stage, case):
     channels, player = recording.test.channels, stage.others.add("player")
     out = [player.create_publisher(channel_type(c), f"channels/{c.name}", STREAM) for c in channels]
     stage.spin_until(lambda: all(p.get_subscription_count() == 2 for p in out), "the channels are subscribed to")
-    for time_ns, values in zip(recording.time_ns.tolist(), recording.values.tolist(), strict=True):
-        for publisher, channel, value in zip(out, channels, values, strict=True):
+    for time_ns, values in zip(recording.time_ns.tolist(), recording.values.tolist()):
+        for publisher, channel, value in zip(out, channels, values):
             publisher.publish(channel_to_msg(channel, stamp(time_zero_ns(recording) + time_ns), value))
         stage.executor.spin_once(timeout_sec=0.0)
     assert_same(stage.wait_for_finals(finals + 1), diagnose(stage.diagnoses[0].structure, [recording]))

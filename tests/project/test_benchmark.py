@@ -46,7 +46,7 @@ def test_the_compiled_mrls_rewinds_as_ours(problem, compiled):
     settings = MRLS | {"rewinds": 0}
     theta, information, pull = problem.initial, np.diag(problem.std**-2.0), np.zeros(0)
     pull = information @ theta
-    for psi, y in zip(problem.psi, problem.target, strict=True):
+    for psi, y in zip(problem.psi, problem.target):
         information = MRLS["forgetting"] * information + psi.T / problem.noise @ psi
         pull = MRLS["forgetting"] * pull + psi.T / problem.noise @ y
     expected = np.linalg.solve(information, pull)

@@ -67,7 +67,7 @@ def test_the_nodes_find_each_other(tmp_path):
     together = environment()
     nodes = [
         subprocess.Popen(shlex.split(c), cwd=ROOT, env=together, stdout=log, stderr=log)
-        for c, log in zip(LISTENING, logs, strict=True)
+        for c, log in zip(LISTENING, logs)
     ]
     try:
         replay = subprocess.run(

@@ -26,7 +26,7 @@ def source(tmp_path):
         + 0.2
         + rng.normal(scale=0.5, size=len(T))
     )
-    lines = (f"{t:.4f},{a:.4f},{-a * 14.7:.4f},1" for t, a in zip(T, pulse, strict=True))
+    lines = (f"{t:.4f},{a:.4f},{-a * 14.7:.4f},1" for t, a in zip(T, pulse))
     (tmp_path / "s.csv").write_text("time,car_ax,barrier_fx,trigger\n" + "\n".join(lines) + "\n")
     (tmp_path / "s.yaml").write_text(
         "test: {id: S1, title: Half sine}\n"

@@ -92,7 +92,7 @@ def test_signs_and_vehicles_that_face_each_other(folder, cars, tmp_path):
     assert (velocity["bullet"], velocity["target"]) == (-SPEEDS[2], SPEEDS[1])
     assert velocity["vehicle1_driver_head"] == SPEEDS[1], "a sensor turned round does not turn its body"
     assert turned.test.channels[turned.test.index("bullet_ax")].source.endswith("sign turned")
-    total = sum(m * velocity[b] for m, b in zip(MASSES.values(), ("target", "bullet"), strict=True))
+    total = sum(m * velocity[b] for m, b in zip(MASSES.values(), ("target", "bullet")))
     assert_allclose(total, 0.0, atol=1.0)
 
 

@@ -87,7 +87,7 @@ def test_traps(camry):
     assert len(camry) == 3500 and (camry.time_ns[0], camry.time_ns[-1]) == (-50_000_000, 299_900_000)
     bottom = camry.column("engine_bottom_ax")
     assert np.isfinite(bottom[:1170]).all() and np.isnan(bottom[1170:]).all()
-    assert [c.name for c, v in zip(camry.test.channels, camry.values.T, strict=True) if not np.isfinite(v).all()] == [
+    assert [c.name for c, v in zip(camry.test.channels, camry.values.T) if not np.isfinite(v).all()] == [
         "engine_bottom_ax"
     ]
     notes = "\n".join(camry.test.notes)

@@ -68,7 +68,7 @@ def test_plastic_spring_gives_back_less_than_it_took(seed):
     turns = np.append(rng.uniform(-0.03, 0.09, 12), 0.0)
     path = np.concatenate([np.linspace(a, b, 400) for a, b in pairwise(turns)])
     peak = np.maximum.accumulate(np.maximum(path, 0.0))
-    force = np.array([spring(x, 0.0, p) for x, p in zip(path, peak, strict=True)])
+    force = np.array([spring(x, 0.0, p) for x, p in zip(path, peak)])
     work = np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(path))
     start = quad(lambda x: spring(x, 0.0, x), 0.0, max(turns[0], 0.0))[0]
     assert (start + work).min() > -1e-3  # J; the trapezium rule's error at the corners

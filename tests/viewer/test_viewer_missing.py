@@ -99,7 +99,7 @@ def cast(crash, streams) -> Cast:
 
 def whole(cast: Cast, crash: crash_data.Crash) -> Cast:
     block = revision(crash, "two_mass", 0.1, True)
-    outputs = tuple(zip(block.name, block.unit, strict=True))
+    outputs = tuple(zip(block.name, block.unit))
     return replace(cast, rankings=(0, 1), outputs=outputs, revisions_whole=True, judged=NAMES)
 
 
@@ -188,7 +188,7 @@ class TestRevisions:
         given, better = revision(crash, "m", 0.3, True), revision(crash, "m + a on b", 0.0, True)
         drawing = whiteness_drawing([given, better], 0)
         for k, block in enumerate((given, better)):
-            stems = [s for s, c in zip(drawing.strips, drawing.strip_colors, strict=True) if c == revision_color(k)]
+            stems = [s for s, c in zip(drawing.strips, drawing.strip_colors) if c == revision_color(k)]
             assert len(stems) == LAGS
             found = autocorrelation(block.residual[:, 0], LAGS).values[1:]
             heights = np.array([-stem[1][1] + stem[0][1] for stem in stems])

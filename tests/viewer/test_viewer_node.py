@@ -132,9 +132,9 @@ def drawn(rrd: Path, entity: str, component: bytes) -> np.ndarray:
         if chunk.entity_path == entity and not chunk.is_static:
             batch = chunk.to_record_batch()
             times = batch.column("crash_time").cast("int64").to_pylist()
-            for field, data in zip(batch.schema, batch.columns, strict=True):
+            for field, data in zip(batch.schema, batch.columns):
                 if (field.metadata or {}).get(b"rerun:component") == component:
-                    rows += zip(times, (row[0] for row in data.to_pylist()), strict=True)
+                    rows += zip(times, (row[0] for row in data.to_pylist()))
     return np.array([value for _, value in sorted(rows)])
 
 

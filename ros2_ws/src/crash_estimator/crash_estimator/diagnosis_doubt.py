@@ -49,7 +49,7 @@ def starts(found: Diagnosis) -> str:
 
 def untouched(model: Model) -> list[str]:
     """Elements that are apart in all recordings."""
-    of_each = zip(model.fit.layout.structure.elements, *model.residuals.links, strict=True)
+    of_each = zip(model.fit.layout.structure.elements, *model.residuals.links)
     return [element.name for element, *links in of_each if all(link.apart.all() for link in links)]
 
 

@@ -83,7 +83,7 @@ def steps_table(found: Diagnosis) -> str:
         ],
     }
     said = {head: cells for head, cells in columns.items() if any(cells)}
-    return table(tuple(said), list(zip(*said.values(), strict=True))) if found.steps else ""
+    return table(tuple(said), list(zip(*said.values()))) if found.steps else ""
 
 
 def revisions_table(found: Diagnosis) -> str:
@@ -91,7 +91,7 @@ def revisions_table(found: Diagnosis) -> str:
     runs = [found.free_run_rms.before, *(step.free_run_rms["after"] for step in found.steps)]
     names = ["as given", *(f"+ {step.effect} on {step.target}" for step in found.steps)]
     rows = []
-    for name, model, run in zip(names, found.models, runs, strict=True):
+    for name, model, run in zip(names, found.models, runs):
         white = "yes" if model.residuals.band_test.white else "no"
         each = [f"{value:#.3g}" for value in _each_output(model, model.residuals.residual)]
         rows.append((name, f"{model.residuals.rms / G:#.3g}", *each, f"{run / G:#.3g}", white))
@@ -100,7 +100,7 @@ def revisions_table(found: Diagnosis) -> str:
     floor = [f"{value:#.3g}" for value in _each_output(first, noise)]
     rows.append(("noise floor", f"{found.residual_rms.noise_floor / G:#.3g}", *floor, "", ""))
     outputs = first.fit.layout.outputs
-    heads = [f"{output.channel} {unit}" for output, (unit, _) in zip(outputs, _units(first), strict=True)]
+    heads = [f"{output.channel} {unit}" for output, (unit, _) in zip(outputs, _units(first))]
     return table(("RMS of the error", "all g", *heads, "run freely g", "white"), rows)
 
 

@@ -28,7 +28,7 @@ class Rows(NamedTuple):
         return Rows(self.number + count, self.time_ns[count:], self.values[count:])
 
     def samples(self) -> Iterator[Sample]:
-        for k, (time_ns, values) in enumerate(zip(self.time_ns.tolist(), self.values, strict=True)):
+        for k, (time_ns, values) in enumerate(zip(self.time_ns.tolist(), self.values)):
             yield Sample(self.number + k, time_ns, values)
 
 
@@ -116,5 +116,5 @@ class Kept:
         self.seen = np.zeros(length, dtype=bool)
         self.time_ns = np.zeros(length, dtype=np.int64)
         self.values = np.zeros((length, self.values.shape[1]))
-        for new, before in zip((self.seen, self.time_ns, self.values), old, strict=True):
+        for new, before in zip((self.seen, self.time_ns, self.values), old):
             new[:have] = before

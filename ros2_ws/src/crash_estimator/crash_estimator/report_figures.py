@@ -114,7 +114,7 @@ def _noise(result: Result, k: int) -> float:
 
 def equations_of(results: dict[str, Result]) -> list[tuple[str, str]]:
     description = next(iter(results.values())).description
-    return list(zip(description.equations, description.equation_units, strict=True))
+    return list(zip(description.equations, description.equation_units))
 
 
 def time_of(estimates: Sequence[Estimate]) -> np.ndarray:

@@ -269,8 +269,6 @@ def _masses(recording: Recording, structure: Structure, end: float) -> list[Bloc
     time_ms, sigma = time_of(estimates), partial(column_of, estimates, "std")
     lines = [Line(time_ms, column_of(estimates, "parameters", k), n, spread=sigma(k)) for k, n in enumerate(names)]
     panel = Panel("effective masses", "time in ms", "kg", lines, y_range=(0.0, 2.0 * float(last.parameters.sum())))
-    found = ", ".join(
-        f"{name} {m:.0f} +- {s:.0f} kg" for name, m, s in zip(names, last.parameters, last.std, strict=True)
-    )
+    found = ", ".join(f"{name} {m:.0f} +- {s:.0f} kg" for name, m, s in zip(names, last.parameters, last.std))
     text = f"{found}; together {last.parameters.sum():.0f} kg."
     return [Heading("Effective masses (figures 4.12, 4.26)"), Paragraph(text), Figure("masses", [panel], columns=1)]

@@ -143,10 +143,10 @@ def thinned(line: Line) -> tuple[np.ndarray, np.ndarray]:
 def _line(line: Line, colour: str, at) -> str:
     x, y = at(*thinned(line))
     if line.style == "o":
-        dots = "".join(f"M{a:.1f} {b:.1f}h0" for a, b in zip(x, y, strict=True) if np.isfinite(a + b))
+        dots = "".join(f"M{a:.1f} {b:.1f}h0" for a, b in zip(x, y) if np.isfinite(a + b))
         return f'<path class="dots" stroke="{escape(colour)}" d="{dots}"/>'
     path, down = [], False
-    for a, b in zip(x, y, strict=True):
+    for a, b in zip(x, y):
         valid = bool(np.isfinite(a + b))
         if valid:
             path.append(f"{'L' if down else 'M'}{a:.1f} {b:.1f}")
@@ -159,5 +159,5 @@ def _band(line: Line, colour: str, at) -> str:
     other, high = thinned(line._replace(y=line.y + line.spread))
     valid, also = np.isfinite(low), np.isfinite(high)
     across, up = at(np.r_[x[valid], other[also][::-1]], np.r_[low[valid], high[also][::-1]])
-    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, up, strict=True))
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, up))
     return f'<polygon fill="{escape(colour)}" fill-opacity="0.15" points="{points}"/>' if points else ""

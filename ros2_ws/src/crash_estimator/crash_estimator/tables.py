@@ -23,10 +23,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [list(head), *[list(row) for row in rows]]
     widths = [max(len(line[k]) for line in lines) for k in range(len(head))]
     aligned = [
-        "  ".join(
-            cell.rjust(width) if k else cell.ljust(width)
-            for k, (cell, width) in enumerate(zip(line, widths, strict=True))
-        )
+        "  ".join(cell.rjust(width) if k else cell.ljust(width) for k, (cell, width) in enumerate(zip(line, widths)))
         for line in lines
     ]
     return "\n".join(line.rstrip() for line in (aligned[0], "-" * len(aligned[0]), *aligned[1:]))
@@ -38,7 +35,7 @@ def parameter_table(description: Description, estimates: Sequence[Estimate]) -> 
     element_of = {name: k for k, name in enumerate(description.elements)}
     peaks = np.abs([estimate.force for estimate in estimates]).max(axis=0, initial=0.0)
     force_unit, per_newton = readable("N", peaks)
-    for k, (name, unit) in enumerate(zip(description.parameters, description.parameter_units, strict=True)):
+    for k, (name, unit) in enumerate(zip(description.parameters, description.parameter_units)):
         element = element_of.get(name.rsplit(".", 1)[0])
         peak = estimates[-1] if element is None else max(estimates, key=lambda estimate: abs(estimate.force[element]))
         shown, factor = readable(unit, [peak.parameters[k]])
@@ -89,9 +86,7 @@ def besides_table(description: Description, last: Estimate) -> str:
     """What the method knows besides the parameters, after the last sample: a noise model, weights, masses."""
     rows = [
         (name, f"{value:.4g}", "" if np.isnan(std) else f"{std:.2g}", unit)
-        for name, value, std, unit in zip(
-            description.extra, last.extra, last.extra_std, description.extra_units, strict=True
-        )
+        for name, value, std, unit in zip(description.extra, last.extra, last.extra_std, description.extra_units)
         if not np.isnan(value)
     ]
     return table(("method, after the last sample", "value", "sigma", "unit"), rows)

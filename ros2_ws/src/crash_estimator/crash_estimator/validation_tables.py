@@ -54,7 +54,7 @@ def covariance_table(validation: Validation) -> str:
             "",
             *(f"{r:+.2f}" for r in validation.correlation[k]),
         )
-        for k, (name, e) in enumerate(zip(names, validation.errors, strict=True))
+        for k, (name, e) in enumerate(zip(names, validation.errors))
     ]
     return table(("covariance of the error", *names, "correlation:", *names), rows)
 

@@ -68,7 +68,7 @@ def _messages(recording: Recording) -> Iterator[tuple[int, int, bytes]]:
     stamps = recording.time_ns + zero
     columns = [encode(channel, stamps, recording.values[:, k]) for k, channel in enumerate(recording.test.channels)]
     yield 0, int(stamps[0]), bytes(encode_test(recording, zero))
-    for stamp, *row in zip(stamps.tolist(), *columns, strict=True):
+    for stamp, *row in zip(stamps.tolist(), *columns):
         for topic, message in enumerate(row, start=1):
             yield topic, stamp, message
 

@@ -113,7 +113,7 @@ def _description(
             },
             "message_count": count,
         }
-        for topic, count in zip(topics, counts, strict=True)
+        for topic, count in zip(topics, counts)
     ]
     return {
         "version": 9,

@@ -43,14 +43,14 @@ def remove_offset(recording: Recording) -> Recording:
     """Subtract each channel's mean before the impact; the notes say how much, and where it could not be done."""
     offset = pre_impact_offset(recording)
     channels = recording.test.channels
-    removed = [f"{c.name} {o:.4g} {c.unit}" for c, o in zip(channels, offset, strict=True) if np.isfinite(o)]
-    kept = [c.name for c, o in zip(channels, offset, strict=True) if not np.isfinite(o) and c.quantity in RESTS_AT_ZERO]
+    removed = [f"{c.name} {o:.4g} {c.unit}" for c, o in zip(channels, offset) if np.isfinite(o)]
+    kept = [c.name for c, o in zip(channels, offset) if not np.isfinite(o) and c.quantity in RESTS_AT_ZERO]
     notes = [f"pre-impact mean removed: {shortened(removed)}"] if removed else []
     if kept:
         notes.append(f"zero offset kept, fewer than {ENOUGH_SAMPLES} samples before time zero: {shortened(kept)}")
     recorded = tuple(
         replace(c, source=_with(c.source, f"offset {o:.4g} {c.unit} removed")) if np.isfinite(o) else c
-        for c, o in zip(channels, offset, strict=True)
+        for c, o in zip(channels, offset)
     )
     test = replace(recording.test, channels=recorded)
     return _changed(replace(recording, test=test), recording.values - np.nan_to_num(offset), notes)
@@ -113,7 +113,7 @@ def filter_recording(recording: Recording, cfc: int | str) -> Recording:
         )
     period = recording.sample_period
     columns, channels, done = [], [], {}
-    for channel, column in zip(recording.test.channels, recording.values.T, strict=True):
+    for channel, column in zip(recording.test.channels, recording.values.T):
         wanted, what = class_of(channel) if cfc == BY_CLASS else (int(cfc), "")
         had = _class_in_name(channel.name)
         if had and had <= wanted:

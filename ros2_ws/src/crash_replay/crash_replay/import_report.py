@@ -33,11 +33,11 @@ def import_report(recording: Recording) -> str:
 
 def _channels(recording: Recording) -> list[str]:
     peaks = _peaks(recording)
-    scale = {q: scale_of(q, [value for c, (value, _) in zip(recording.test.channels, peaks, strict=True) if c.quantity
+    scale = {q: scale_of(q, [value for c, (value, _) in zip(recording.test.channels, peaks) if c.quantity
     == q])
              for q in {channel.quantity for channel in recording.test.channels}}  # fmt: skip
     rows = [("channel", "body", "quantity", "peak", "", "at")]
-    for channel, (value, at) in zip(recording.test.channels, peaks, strict=True):
+    for channel, (value, at) in zip(recording.test.channels, peaks):
         unit, factor = scale[channel.quantity]
         rows.append((channel.name, channel.body, channel.quantity, f"{value * factor:.5g}", unit, f"{1e3 * at:.2f} ms"))
     return _aligned(rows, right=(3, 5))
@@ -74,8 +74,7 @@ def _aligned(rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> list[s
     lines = []
     for row in rows:
         cells = [
-            text.rjust(width) if k in right else text.ljust(width)
-            for k, (text, width) in enumerate(zip(row, widths, strict=True))
+            text.rjust(width) if k in right else text.ljust(width) for k, (text, width) in enumerate(zip(row, widths))
         ]
         lines.append("  " + "  ".join(cells).rstrip())
     return lines
@@ -95,7 +94,7 @@ def found(recording: Recording, bag: Path) -> dict[str, Any]:
     """For --json, SI units."""
     test = recording.test
     channels = []
-    for channel, (value, at) in zip(test.channels, _peaks(recording), strict=True):
+    for channel, (value, at) in zip(test.channels, _peaks(recording)):
         peak = {"value": value, "time": at} if np.isfinite(value) else None
         channels.append(
             {"name": channel.name, "quantity": channel.quantity, "unit": channel.unit, "body": channel.body}

@@ -28,7 +28,7 @@ class Numbers:
 
     @property
     def spans(self) -> list[Span]:
-        return list(zip(self.starts, self.stops, strict=True))
+        return list(zip(self.starts, self.stops))
 
     def missing(self, start: int, stop: int) -> list[Span]:
         """The spans of start, ..., stop - 1 that are not there."""

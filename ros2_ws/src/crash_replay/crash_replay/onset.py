@@ -57,7 +57,7 @@ def find_onset(recording: Recording) -> Onset | None:
         return None
     run = max(LEAST_RUN, round(RUN / period))
     names, columns, alarms = [], [], []
-    for channel, values in zip(recording.test.channels, recording.values.T, strict=True):
+    for channel, values in zip(recording.test.channels, recording.values.T):
         if channel.quantity not in RESTS_AT_ZERO or not np.isfinite(values[:quiet]).all():
             continue
         column = _in_its_noise(values, quiet, run)

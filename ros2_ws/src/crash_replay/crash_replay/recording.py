@@ -178,5 +178,5 @@ class Recording:
 
     def samples(self) -> Iterator[Sample]:
         """The samples in order, as a live replay would deliver them."""
-        for number, (time_ns, values) in enumerate(zip(self.time_ns.tolist(), self.values, strict=True)):
+        for number, (time_ns, values) in enumerate(zip(self.time_ns.tolist(), self.values)):
             yield Sample(number, time_ns, values)

@@ -95,7 +95,7 @@ def samples_from_msg(message: Samples) -> list[Sample]:
             f"{len(times)} instants"
         )
     rows = np.frombuffer(message.values).reshape(len(times), -1)
-    return [Sample(message.number + k, time_ns, row) for k, (time_ns, row) in enumerate(zip(times, rows, strict=True))]
+    return [Sample(message.number + k, time_ns, row) for k, (time_ns, row) in enumerate(zip(times, rows))]
 
 
 def channel_type(channel: Channel) -> type:

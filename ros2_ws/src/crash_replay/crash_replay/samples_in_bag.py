@@ -24,7 +24,7 @@ def read_samples(where: str, topic: Topic, channels: int, total: int) -> tuple[n
     if topic.type != SAMPLES_TYPE:
         raise RecordingError(f"{where}: must be {SAMPLES_TYPE}, found {topic.type}")
     parts = [_read_message(where, data, channels, total or MOST) for data in topic.messages]
-    numbers, times, values = (np.concatenate(column) for column in zip(*parts, strict=True))
+    numbers, times, values = (np.concatenate(column) for column in zip(*parts))
     _, first, of = np.unique(numbers, return_index=True, return_inverse=True)
     again = (times != times[first][of]) | ~_same(values, values[first][of])
     if again.any():

@@ -43,9 +43,7 @@ def samples_within(window: Window, time_ns: np.ndarray) -> tuple[int, int]:
     first, end = int(np.searchsorted(time_ns, low)), int(np.searchsorted(time_ns, high, side="right"))
     if first < end:
         return first, end
-    asked = [
-        f"{name} {value:g} s" for name, value, none in zip(PARAMETERS, window, Window(), strict=True) if value != none
-    ]
+    asked = [f"{name} {value:g} s" for name, value, none in zip(PARAMETERS, window, Window()) if value != none]
     there = f"{time_ns[0] / SECOND:g} to {time_ns[-1] / SECOND:g} s"
     raise SelectionError(f"no sample to play with {', '.join(asked)}: the test has samples from {there}")
 

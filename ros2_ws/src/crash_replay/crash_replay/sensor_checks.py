@@ -24,7 +24,7 @@ GAP = 1.5
 def doubtful_channels(recording: Recording) -> list[str]:
     """A line for each channel that looks faulty, and one for each with values missing."""
     notes = []
-    for channel, values in zip(recording.test.channels, recording.values.T, strict=True):
+    for channel, values in zip(recording.test.channels, recording.values.T):
         valid = np.isfinite(values)
         if not valid.any():
             notes.append(f"{channel.name}: has no valid value")

@@ -157,7 +157,7 @@ class Graph:
         quiet = time.perf_counter()
         while self._missing(before, int(sent[1])) and time.perf_counter() < max(quiet, listener.last) + 2.0:
             self.executor.spin_once(timeout_sec=0.05)
-        heard = tuple(now - then for now, then in zip(listener.heard, before, strict=True))
+        heard = tuple(now - then for now, then in zip(listener.heard, before))
         del self.children.all["replay"]
         return Pass(int(sent[1]), int(sent[2]), float(sent[3]), heard, listener.last - listener.first)
 
@@ -170,7 +170,7 @@ class Graph:
         self.listener.destroy_client(client)
 
     def _missing(self, before: Sequence[int], sent: int) -> bool:
-        return any(now - then < sent for now, then in zip(self.listener.heard, before, strict=True))
+        return any(now - then < sent for now, then in zip(self.listener.heard, before))
 
 
 def latencies(graph: Graph, recording: Recording, rate: float, samples: int) -> np.ndarray:

@@ -55,7 +55,7 @@ def _length(folder: Path, seconds: Sequence[float]) -> Iterator[Row]:
         cost.append((perf_counter() - start) / (blocks * BLOCK))
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
-    numbers = ", ".join(f"{length:g} s: {microseconds(c)}" for length, c in zip(seconds, cost, strict=True))
+    numbers = ", ".join(f"{length:g} s: {microseconds(c)}" for length, c in zip(seconds, cost))
     what = "a sample by the record's length at 10 kHz"
     yield Row(what, numbers, "constant: linear in length", cost[-1] / cost[0], 1.5, least=False)
     said = f"{peaks[0] / 1024:.0f} to {peaks[-1] / 1024:.0f} KiB"

@@ -60,7 +60,7 @@ class Actions:
                 moved, slope = 1.0 / (1.0 + c) - 1.0, -share / (1.0 + c) ** 2
                 signal = x[k] - start[0][k] - start[1][k] * t, v[k] - start[1][k], a[k]
             by_x[k, column], by_v[k, column] = slope * signal[0], slope * signal[1]
-            x[k], v[k], a[k] = (value + share * moved * s for value, s in zip((x[k], v[k], a[k]), signal, strict=True))
+            x[k], v[k], a[k] = (value + share * moved * s for value, s in zip((x[k], v[k], a[k]), signal))
         crush, rate = (
             np.where(self.measured_crush, given, given + now[self.ends[:, 0]] - now[self.ends[:, 1]])
             for given, now in ((motion.crush, x - motion.displacement), (motion.rate, v - motion.velocity))

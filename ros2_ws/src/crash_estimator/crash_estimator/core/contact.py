@@ -50,9 +50,7 @@ class Contact:
         self.compression_only = np.array([not element.tension for element in structure.elements], dtype=bool)
         self.never_pulls = np.array([not element.damper_pulls for element in structure.elements], dtype=bool)
         slopes = [element.unloading_slope for element in structure.elements]  # of the estimated ones, at first
-        self.unloading = np.array(
-            [e.unloading or (s.value if s else 0.0) for e, s in zip(structure.elements, slopes, strict=True)]
-        )
+        self.unloading = np.array([e.unloading or (s.value if s else 0.0) for e, s in zip(structure.elements, slopes)])
         self.plastic = self.unloading > 0.0
         self.actions = structure.actions
 

@@ -27,7 +27,7 @@ def equation_errors(description, estimates: Sequence[Estimate]) -> list[Equation
     """One row per equation; description is the estimator's Description."""
     after = [estimate for estimate in estimates if estimate.time_ns >= 0]
     rows = []
-    for k, (name, unit) in enumerate(zip(description.equations, description.equation_units, strict=True)):
+    for k, (name, unit) in enumerate(zip(description.equations, description.equation_units)):
         measured = np.array([e.measured[k] for e in after])
         predicted = np.array([e.predicted[k] for e in after])
         valid = ~np.isnan(measured)

@@ -74,14 +74,14 @@ def free_run(
     x, v = after[0].displacement.copy(), after[0].velocity.copy()
     state = run.start(time[0], x, v)
     states = [state]
-    for start, stop in zip(time[:-1], time[1:], strict=True):
+    for start, stop in zip(time[:-1], time[1:]):
         steps = int(np.ceil((stop - start) / LONGEST_STEP - 1e-9))
         h = (stop - start) / steps
         for k in range(steps):
             state = run.step(start + k * h, h, state)
         states.append(state)
     loads = np.array([run.loads(t, state) for t, state in zip(time, states, strict=True)])
-    acceleration = np.array([run.accelerations(t, load) for t, load in zip(time, loads, strict=True)])
+    acceleration = np.array([run.accelerations(t, load) for t, load in zip(time, loads)])
     force = np.array([run.forces(t, state) for t, state in zip(time, states, strict=True)])
     return FreeRun(
         time=time,
@@ -116,7 +116,7 @@ class _System:
         self.structure, self.c, self.applied = structure, c, applied
         self.laws, self.ends, self.time = laws, structure.ends, time
         self.masses = np.array([b.mass if b.free else np.inf for b in structure.bodies])
-        for value, action in zip(c, structure.actions, strict=True):
+        for value, action in zip(c, structure.actions):
             if action.kind == "mass":
                 self.masses[action.at] += value
             elif action.kind == "inertia" and action.coefficient.estimated and action.lighter >= 0:
@@ -204,7 +204,7 @@ class _System:
         """(n, q) what the equations' channels would show of (n, b) accelerations and loads."""
         true = [acceleration[:, k] if self.structure.bodies[k].free else loads[:, k] for k in self.structure.equations]
         shown = np.stack(true, axis=1)
-        for value, action in zip(self.c, self.structure.actions, strict=True):
+        for value, action in zip(self.c, self.structure.actions):
             if action.kind in ("gain", "offset") and action.at in self.structure.equations:
                 row = self.structure.equations.index(action.at)
                 more = shown[:, row] if action.kind == "gain" else 1.0
@@ -258,7 +258,7 @@ def compare(
     """Every equation's signal and every free body's velocity; `smooth` (a filter) is applied to both signals."""
     signals = [
         (name, unit, smooth(run.measured[:, k]), smooth(run.predicted[:, k]))
-        for k, (name, unit) in enumerate(zip(description.equations, description.equation_units, strict=True))
+        for k, (name, unit) in enumerate(zip(description.equations, description.equation_units))
     ]
     signals += [
         (f"{body.name} velocity", "m/s", run.measured_velocity[:, k], run.velocity[:, k])

@@ -65,7 +65,7 @@ def initial_motion(structure: Structure, test: Test) -> tuple[np.ndarray, np.nda
     A fixed body rests at 0, whatever the test says of its name.
     """
     both = np.zeros((2, len(structure.bodies)))
-    for values, stated, part in zip(both, (test.initial_displacement, test.initial_velocity), (0, 1), strict=True):
+    for values, stated, part in zip(both, (test.initial_displacement, test.initial_velocity), (0, 1)):
         for k, body in enumerate(structure.bodies):
             carriers = [test.channels[test.index(name)].body for name in body.acceleration]
             known = [name for name in (body.name, *carriers) if name in stated]

@@ -55,17 +55,11 @@ class MassFirst:
     def _second(self, masses: tuple[float, ...]) -> Any:
         if self._made[0] != masses:
             names = self.masses.description.parameters
-            structure = (
-                with_effective_masses(self.structure, dict(zip(names, masses, strict=True)))
-                if masses
-                else self.structure
-            )
+            structure = with_effective_masses(self.structure, dict(zip(names, masses))) if masses else self.structure
             self._made = (masses, self.make(structure))
         return self._made[1]
 
     def _event(self, found: Estimate) -> Event:
         names = (name.removesuffix(".mass") for name in self.masses.description.parameters)
-        text = ", ".join(
-            f"{n} {m:.0f} +- {s:.0f} kg" for n, m, s in zip(names, found.parameters, found.std, strict=True)
-        )
+        text = ", ".join(f"{n} {m:.0f} +- {s:.0f} kg" for n, m, s in zip(names, found.parameters, found.std))
         return Event("masses", "masses", float(found.parameters.sum()), f"effective masses from here on: {text}")

@@ -116,9 +116,7 @@ class Regressor:
         self.drift_squared = np.array([self._drift(p) ** 2 for p in parameters])
         self.every = tuple(  # of all parameters, the actions' too: element, is_stiffness, estimated
             np.array(column)
-            for column in zip(
-                *((p.element, p.is_stiffness, p.coefficient.estimated) for p in structure.parameters), strict=True
-            )
+            for column in zip(*((p.element, p.is_stiffness, p.coefficient.estimated) for p in structure.parameters))
         )
         self.noise = np.array([structure.bodies[k].noise or np.nan for k in structure.equations]) ** 2
 

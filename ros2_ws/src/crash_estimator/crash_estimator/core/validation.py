@@ -80,7 +80,7 @@ def validate(
     chosen = [e for e in estimates if start <= e.time_ns * 1e-9 <= end]
     series = np.array([getattr(e, what) for e in chosen]).reshape(len(chosen), len(description.equations))
     equations = []
-    for row, (name, unit) in enumerate(zip(description.equations, description.equation_units, strict=True)):
+    for row, (name, unit) in enumerate(zip(description.equations, description.equation_units)):
         valid = np.isfinite(series[:, row])
         inputs = {
             f"{element}.{kind}": np.array([getattr(e, kind)[k] for e in chosen])[valid]

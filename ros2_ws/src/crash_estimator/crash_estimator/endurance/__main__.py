@@ -86,7 +86,7 @@ def is_sound(one: Endured) -> bool:
 
 
 def is_flat(one: Grown) -> bool:
-    more = [end - settled for settled, end in zip(one.settled[1:], one.end[1:], strict=True)]
+    more = [end - settled for settled, end in zip(one.settled[1:], one.end[1:])]
     return one.end.memory < (1.0 + GROWTH) * one.settled.memory and max(more) <= FEW
 
 
@@ -98,7 +98,7 @@ def method_row(one: Endured) -> list[str]:
 
 def node_row(one: Grown) -> list[str]:
     pairs = [f"{one.settled.memory / MEGABYTE:.1f} -> {one.end.memory / MEGABYTE:.1f}"]
-    pairs += [f"{settled} -> {end}" for settled, end in zip(one.settled[1:], one.end[1:], strict=True)]
+    pairs += [f"{settled} -> {end}" for settled, end in zip(one.settled[1:], one.end[1:])]
     return [one.node, f"{one.times} {one.what}", *pairs, "yes" if is_flat(one) else "NO"]
 
 

@@ -87,7 +87,7 @@ def vibration(samples: int) -> Iterator[Sample]:
         noise = NOISE * random.standard_normal((2, len(t)))
         block = np.column_stack([-force / MASS + noise[0], travel, speed, force + noise[1]])
         block[number % 7001 == 7000, 0] = np.nan
-        for k, values in zip(number.tolist(), block, strict=True):
+        for k, values in zip(number.tolist(), block):
             yield Sample(k, k * 100_000, values)
 
 

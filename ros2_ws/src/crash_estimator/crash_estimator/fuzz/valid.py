@@ -46,9 +46,7 @@ RECORDING = Recording(
     np.stack([-100.0 * np.sin(TIME * 1e-7), 1e5 * np.sin(TIME * 1e-7), TIME * 1e-8], axis=1),
 )
 
-ROWS = [
-    f"{t * 1e-9:.4f},{a:.4g},{f:.4g}" for t, (a, f, _) in zip(TIME.tolist(), RECORDING.values.tolist(), strict=True)
-]
+ROWS = [f"{t * 1e-9:.4f},{a:.4g},{f:.4g}" for t, (a, f, _) in zip(TIME.tolist(), RECORDING.values.tolist())]
 CSV: Files = {
     "rib.csv": "\n".join(["time,rib_ay,barrier_fx", *ROWS, ""]).encode(),
     "rib.yaml": b"""test: {id: T1, title: "side impact, padded door", source: "sled 3"}

@@ -72,9 +72,9 @@ class NamedMessages:
         d = description
         names, units = (*d.parameters, *d.extra), (*d.parameter_units, *d.extra_units)
         head = {"model": d.model, "method": d.method, "revision": revision}
-        entries = [Parameter(name=name, unit=unit) for name, unit in zip(names, units, strict=True)]
+        entries = [Parameter(name=name, unit=unit) for name, unit in zip(names, units)]
         self.parameters = Entries(Parameters(parameters=entries, **head), "parameters", FIELDS[ParametersBlock])
-        entries = [Equation(name=name, unit=unit) for name, unit in zip(d.equations, d.equation_units, strict=True)]
+        entries = [Equation(name=name, unit=unit) for name, unit in zip(d.equations, d.equation_units)]
         self.residuals = Entries(Residuals(equations=entries, **head), "equations", FIELDS[ResidualsBlock])
 
 
@@ -98,6 +98,6 @@ class Entries:
             self.message.set_stamp(stamp_ns + time_ns - times[0])
             self.number[0], self.time[0] = columns.number + row, time_ns * 1e-9
             for places, table in tables:
-                for place, value in zip(places, table[row], strict=True):
+                for place, value in zip(places, table[row]):
                     place[0] = value
             yield bytes(self.message)

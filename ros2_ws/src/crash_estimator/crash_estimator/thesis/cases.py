@@ -118,10 +118,10 @@ def trials(scenario: Scenario, seeds: int) -> tuple[Truth, Iterator[Trial]]:
     def one(seed: int) -> Trial:
         readings = [
             read(sensor, signal, np.random.default_rng([seed, k]))
-            for k, (sensor, signal) in enumerate(zip(scenario.sensors, signals, strict=True))
+            for k, (sensor, signal) in enumerate(zip(scenario.sensors, signals))
         ]
         values = np.stack([reading.values for reading in readings], axis=1)
-        noise = {sensor.channel.name: reading.noise for sensor, reading in zip(scenario.sensors, readings, strict=True)}
+        noise = {sensor.channel.name: reading.noise for sensor, reading in zip(scenario.sensors, readings)}
         return Trial(Recording(exact.test, exact.time_ns, values), noise)
 
     return truth, (one(seed) for seed in range(seeds))

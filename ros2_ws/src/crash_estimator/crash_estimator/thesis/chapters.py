@@ -195,11 +195,7 @@ def _parameters(found: Ratios, scenario, case: str, figure: str) -> list[Panel]:
 
 def _estimated(found: Ratios) -> set[str]:
     last = found.example["mrls"].estimates[-1]
-    return {
-        name
-        for name, status in zip(found.example["mrls"].description.parameters, last.status, strict=True)
-        if status != 1
-    }
+    return {name for name, status in zip(found.example["mrls"].description.parameters, last.status) if status != 1}
 
 
 def _outputs(found: Ratios, figure: str) -> list[Panel]:

@@ -216,7 +216,7 @@ def sampling(seeds: int) -> Sampling:
         vibration = _vibration(trial.recording.time)
         fine = Recording(trial.recording.test, trial.recording.time_ns, trial.recording.values + vibration[:, None])
         laws = []
-        for name, recording in zip(SAMPLED, (fine, coarser(fine, 1e-3)), strict=True):
+        for name, recording in zip(SAMPLED, (fine, coarser(fine, 1e-3))):
             result = estimate(structure, recording, "gauss_newton_orders", memory=0.02)
             laws.append(characteristics(structure, result.description, result.estimates)[0])
             orders[name].append(tuple(int(x) for x in result.estimates[-1].extra))

@@ -121,7 +121,7 @@ def estimates_of(parameters: ParameterBlock, residuals: ResidualBlock, forces: F
             acceleration=forces.acceleration[k],
             events=(),
         )
-        for time_ns, i, j, k in zip(common, p, r, f, strict=True)
+        for time_ns, i, j, k in zip(common, p, r, f)
     ]
 
 

@@ -85,7 +85,7 @@ class Motion:
         ends = frame_ends(block.time_ns, cast.span)
         crush, force = (np.nan_to_num(values[ends], posinf=0.0, neginf=0.0) for values in (block.crush, block.force))
         new = (block.time_ns[ends], crush, force, block.state[ends])
-        for column, rows in zip((lane.time_ns, lane.crush, lane.force, lane.state), new, strict=True):
+        for column, rows in zip((lane.time_ns, lane.crush, lane.force, lane.state), new):
             column.append(rows)
         scale = self._grown(cast, block, crush, force)
         if scale == self.scale:
@@ -150,7 +150,7 @@ class Motion:
         time_ns = time_ns + self.drawn_again
         shift = REST * crush @ lane.positions.T / scale.length  # (frames, bodies)
         at = {}
-        for k, (body, mass) in enumerate(zip(member.bodies, member.masses, strict=True)):
+        for k, (body, mass) in enumerate(zip(member.bodies, member.masses)):
             if body not in figure.columns:
                 continue
             x = figure.columns[body] * PITCH + shift[:, k]
@@ -194,7 +194,7 @@ class Motion:
 def _expected_crush(cast: Cast, block: ForceBlock) -> float:
     """A first guess of the length scale, m: the closing speed for part of the recording, at most a crash's 50 ms."""
     speed = np.nan_to_num(block.velocity[0])
-    at = {body: float(v) for body, v in zip(block.body, speed, strict=True)}
+    at = {body: float(v) for body, v in zip(block.body, speed)}
     closing = max(abs(at[a] - at[b]) for a, b in cast.member(block.estimator).between)
     return max(1.25 * closing * min(0.05, 0.3 * cast.span[1]), 0.02)
 

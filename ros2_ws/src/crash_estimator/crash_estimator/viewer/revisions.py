@@ -147,7 +147,7 @@ def whiteness_drawing(blocks: list[RevisionBlock], k: int) -> Drawing:
         if len(left) <= LAGS or not np.ptp(left) > 0.0:
             continue
         found = autocorrelation(left, LAGS)
-        for lag, value in zip(found.lags[1:], found.values[1:], strict=True):
+        for lag, value in zip(found.lags[1:], found.values[1:]):
             stem = [frame.at(lag + shift, 0.0), frame.at(lag + shift, max(float(value), -0.5))]
             drawing.line(stem, revision_color(revision), 1.0)
         for limit in (-found.limit(0.95), found.limit(0.95)):

@@ -75,7 +75,7 @@ def _disorder(between: tuple[tuple[str, str], ...], figure: Schematic) -> tuple[
     """Springs through bodies and bodies over one another, then rows, then the springs out of their given order."""
     columns, heights = figure.columns, figure.heights
     clashes = 0
-    for (a, b), row in zip(between, figure.rows, strict=True):
+    for (a, b), row in zip(between, figure.rows):
         low, high = sorted((columns[a], columns[b]))
         clashes += sum(low < columns[k] < high and heights[k][0] <= row <= heights[k][1] for k in columns)
     bodies = list(columns)

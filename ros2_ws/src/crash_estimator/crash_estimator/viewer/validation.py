@@ -48,7 +48,7 @@ def tables(cast: Cast, name: str, one: Judged) -> str:
     runs = {c.name: c for c in one.comparisons}
     lines = [f"**{markdown(cast.label(name))}**: what is left over after the impact", ""]
     lines += [
-        row("", [f"{e.equation}, {s.unit}" for e, s in zip(errors, shown, strict=True)]),
+        row("", [f"{e.equation}, {s.unit}" for e, s in zip(errors, shown)]),
         "|---|" + "---:|" * len(errors),
     ]
     for title, mean, variance in (
@@ -56,10 +56,7 @@ def tables(cast: Cast, name: str, one: Judged) -> str:
         ("predicted", "output_mean", "output_variance"),
         ("error", "error_mean", "error_variance"),
     ):
-        cells = [
-            (s.factor * getattr(e, mean), s.factor**2 * getattr(e, variance))
-            for e, s in zip(errors, shown, strict=True)
-        ]
+        cells = [(s.factor * getattr(e, mean), s.factor**2 * getattr(e, variance)) for e, s in zip(errors, shown)]
         lines.append(row(f"{title}: mean, variance", [f"{m:.3g}, {v:.3g}" for m, v in cells]))
     for level in LEVELS:
         inside = [f"{e.auto.inside(level):.0%}" if e.auto else "–" for e in equations]
@@ -72,8 +69,8 @@ def tables(cast: Cast, name: str, one: Judged) -> str:
     lines += [row("", [e.equation for e in errors]), "|---|" + "---:|" * len(errors)]
     factors = np.array([s.factor for s in shown])
     covariance = one.validation.covariance * np.outer(factors, factors)
-    for e, values, correlation in zip(errors, covariance, one.validation.correlation, strict=True):
-        lines.append(row(e.equation, [f"{v:.3g} ({r:+.2f})" for v, r in zip(values, correlation, strict=True)]))
+    for e, values, correlation in zip(errors, covariance, one.validation.correlation):
+        lines.append(row(e.equation, [f"{v:.3g} ({r:+.2f})" for v, r in zip(values, correlation)]))
     return "\n".join(lines)
 
 
@@ -99,10 +96,7 @@ def correlation_drawing(cast: Cast, found: Mapping[str, Correlation]) -> Drawing
             if abs(limit) <= 1.0:
                 drawing.line([frame.at(float(first.lags[0]), limit), frame.at(lags, limit)], color, 0.6)
     for name, one in found.items():
-        line = [
-            frame.at(float(lag), float(value))
-            for lag, value in zip(one.lags, np.clip(one.values, -1.0, 1.0), strict=True)
-        ]
+        line = [frame.at(float(lag), float(value)) for lag, value in zip(one.lags, np.clip(one.values, -1.0, 1.0))]
         drawing.line(line, cast.color(name), 1.3)
     for at, level, color in zip((0.5, 0.8, 1.1), LEVELS, LIMIT_COLORS, strict=False):
         drawing.text((at, 0.99), f"{level:.0%} limits" if level == 0.90 else f"{level:.0%}", color)

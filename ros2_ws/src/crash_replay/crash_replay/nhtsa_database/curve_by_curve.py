@@ -141,4 +141,4 @@ def _two_columns(text: bytes, row: Mapping[str, Any], what: str) -> str:
     times = table[:, 0] if table.shape[1] == 2 else np.zeros(len(table))
     if len(times) < 2 or np.ptp(times) == 0.0:
         times = (_number(row, "NFP") + np.arange(len(table))) * _number(row, "DELT") * 1e-6
-    return "".join(f"{t:.9g}\t{v:.9g}\n" for t, v in zip(times, table[:, -1], strict=True))
+    return "".join(f"{t:.9g}\t{v:.9g}\n" for t, v in zip(times, table[:, -1]))

@@ -101,7 +101,7 @@ def _by_momentum(
 
 def _said(members: Sequence[Sensor], found: Agreement) -> list[str]:
     """A line for each sensor that contradicts the others, and one for two of which nobody knows which is right."""
-    change = [f"{member.channel.name} {3.6 * dv:.1f} km/h" for member, dv in zip(members, found.change, strict=True)]
+    change = [f"{member.channel.name} {3.6 * dv:.1f} km/h" for member, dv in zip(members, found.change)]
     sound = [3.6 * dv for k, dv in enumerate(found.change) if k not in found.outliers]
     if found.undecided:
         return [f"{members[0].channel.body}: two sensors contradict each other, which is right is not known: change of "

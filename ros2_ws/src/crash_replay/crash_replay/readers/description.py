@@ -75,13 +75,9 @@ def apply_names(recording: Recording, path: Path) -> Recording:
     given = _given(test.channels, names, path)
     turned = _turned_bodies(test, names, path)
     signs = np.array([_sign(channel, given[channel], turned) for channel in test.channels])
-    channels = tuple(
-        _renamed(channel, given[channel], sign) for channel, sign in zip(test.channels, signs, strict=True)
-    )
+    channels = tuple(_renamed(channel, given[channel], sign) for channel, sign in zip(test.channels, signs))
     stated = {body: -v if body in turned and v else v for body, v in test.initial_velocity.items()}
-    inherited = {
-        new.body: stated[old.body] for old, new in zip(test.channels, channels, strict=True) if old.body in stated
-    }
+    inherited = {new.body: stated[old.body] for old, new in zip(test.channels, channels) if old.body in stated}
     changed = dict(
         id=names.test.id or test.id,
         title=names.test.title or test.title,

@@ -103,10 +103,10 @@ def read(path: Path, all_sensors: bool = False) -> Recording:
         raise RecordingError(f"{path}: no channel can be used: {'; '.join(notes)}")
     tracks, time_ns, values = _common_time(path, tracks, notes)
     channels = unique([track.channel for track in tracks])
-    if any(_on_barrier(track.code, channel) for track, channel in zip(tracks, channels, strict=True)):
+    if any(_on_barrier(track.code, channel) for track, channel in zip(tracks, channels)):
         notes.append("barrier forces keep their recorded sign; a model expects compression to be positive")
     made, outliers = _made_of_several(header, tracks, channels, time_ns, values, notes)
-    columns = made | {c: v for c, v in zip(channels, values.T, strict=True) if all_sensors or c.name not in outliers}
+    columns = made | {c: v for c, v in zip(channels, values.T) if all_sensors or c.name not in outliers}
     source = [header.get("laboratory name"), header.get("date of the test"), headers[0].name]
     velocity = _initial_velocity(header, tracks, notes)
     try:
@@ -237,7 +237,7 @@ def _made_of_several(
         notes.append(f"barrier_fx: sum of {len(cells)} cells; positive in compression: {sign}")
     sensors = [
         Sensor(channel, column)
-        for channel, column in zip(channels, values.T, strict=True)
+        for channel, column in zip(channels, values.T)
         if (channel.quantity, channel.axis) == ("acceleration", "x")
         and channel.body.endswith(("car", "engine"))
         and np.isfinite(column).mean() >= LASTS

@@ -120,7 +120,7 @@ def _read_tracks(header_file: Path, header: Header) -> tuple[list[Track], list[t
     """The usable curves, and the others with the reason why they are not."""
     tracks, left_out = [], []
     vehicles = len(header.masses)
-    named = list(zip(header.curves, channel_names(header.curves, vehicles), strict=True))
+    named = list(zip(header.curves, channel_names(header.curves, vehicles)))
     for curve, name in with_progress(named, "reading curve"):
         try:
             tracks.append(_read_track(header_file, curve, name, body_of(curve, vehicles)))

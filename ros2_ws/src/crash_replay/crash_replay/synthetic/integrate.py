@@ -52,7 +52,7 @@ class _Equations:
         self.masses = np.stack(masses, axis=1).tolist()
         pushed = [body.push(grid) if body.push else still for body in system.bodies]
         self.pushed = np.stack(pushed, axis=1).tolist()
-        self.links = [(a, b, element.force) for (a, b), element in zip(system.ends(), system.elements, strict=True)]
+        self.links = [(a, b, element.force) for (a, b), element in zip(system.ends(), system.elements)]
         self.slips = [element.slips if element.slip else None for element in system.elements]
         self.remembers = any(self.slips)
 
@@ -64,25 +64,25 @@ class _Equations:
 
     def forces(self, state: State) -> list[float]:
         x, v, peak, slipped = state
-        each = zip(self.links, self.largest(peak, x), slipped, strict=True)
+        each = zip(self.links, self.largest(peak, x), slipped)
         return [law(x[a] - x[b], v[a] - v[b], p, s) for (a, b, law), p, s in each]
 
     def flows(self, state: State) -> list[float]:
         """(e,) 1/s, of what the slips remember."""
         x, v, _, slipped = state
-        each = zip(self.links, self.slips, slipped, strict=True)
+        each = zip(self.links, self.slips, slipped)
         return [slips(x[a] - x[b], v[a] - v[b], s) if slips else 0.0 for (a, b, _), slips, s in each]
 
     def loads(self, forces: list[float]) -> list[float]:
         loads = [0.0] * self.bodies
-        for (a, b, _), force in zip(self.links, forces, strict=True):
+        for (a, b, _), force in zip(self.links, forces):
             loads[a] -= force
             loads[b] += force
         return loads
 
     def accelerations(self, node: int, state: State) -> list[float]:
         loads = self.loads(self.forces(state))
-        columns = zip(loads, self.pushed[node], self.masses[node], self.driven[node], strict=True)
+        columns = zip(loads, self.pushed[node], self.masses[node], self.driven[node])
         return [(load + push) / mass if mass else given for load, push, mass, given in columns]
 
 
@@ -97,7 +97,7 @@ def simulate(system: System, time: np.ndarray, max_step: float = MAX_STEP) -> Hi
     nothing = [0.0] * len(system.elements)
     state, node = State(x, v, equations.largest(nothing, x), nothing), 0
     nodes, states = [node], [state]
-    for dt, count in zip(np.diff(time).tolist(), steps, strict=True):
+    for dt, count in zip(np.diff(time).tolist(), steps):
         for _ in range(count):
             state, node = _step(equations, node, state, dt / count), node + 2
         nodes.append(node)
@@ -122,30 +122,28 @@ def _step(equations: _Equations, node: int, state: State, h: float) -> State:
     k2 = slope(ahead(0.5 * h, k1), node + 1)
     k3 = slope(ahead(0.5 * h, k2), node + 1)
     k4 = slope(ahead(h, k3), node + 2)
-    mean = State(*(_weighted(*each) for each in zip(k1, k2, k3, k4, strict=True)))
+    mean = State(*(_weighted(*each) for each in zip(k1, k2, k3, k4)))
     end = ahead(h / 6.0, mean)
     bounded = [min(max(s, -1.0), 1.0) for s in end.slipped] if equations.remembers else slipped
     return State(end.x, end.v, equations.largest(peak, end.x), bounded)
 
 
 def _moved(start: list[float], h: float, slope: list[float]) -> list[float]:
-    return [value + h * rate for value, rate in zip(start, slope, strict=True)]
+    return [value + h * rate for value, rate in zip(start, slope)]
 
 
 def _weighted(k1: list[float], k2: list[float], k3: list[float], k4: list[float]) -> list[float]:
-    return [a + 2.0 * b + 2.0 * c + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
+    return [a + 2.0 * b + 2.0 * c + d for a, b, c, d in zip(k1, k2, k3, k4)]
 
 
 def _history(equations: _Equations, time: np.ndarray, nodes: list[int], states: list[State]) -> History:
-    x, v, peak, _ = (np.array(column) for column in zip(*states, strict=True))
+    x, v, peak, _ = (np.array(column) for column in zip(*states))
     force = np.array([equations.forces(state) for state in states])
     return History(
         time=time,
         displacement=x,
         velocity=v,
-        acceleration=np.array(
-            [equations.accelerations(node, state) for node, state in zip(nodes, states, strict=True)]
-        ),
+        acceleration=np.array([equations.accelerations(node, state) for node, state in zip(nodes, states)]),
         load=np.array([equations.loads(row) for row in force.tolist()]),
         crush=np.array([equations.crush(state.x) for state in states]),
         rate=np.array([equations.crush(state.v) for state in states]),

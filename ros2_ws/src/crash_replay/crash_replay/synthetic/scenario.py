@@ -66,15 +66,15 @@ def record(scenario: Scenario, seed: int) -> tuple[Recording, Truth]:
     time = time_ns * 1e-9
     moving = simulate(system, time[before:], scenario.max_step)
     quiet = _before(system, moving, time[:before])
-    history = History(*(np.concatenate(columns) for columns in zip(quiet, moving, strict=True)))
+    history = History(*(np.concatenate(columns) for columns in zip(quiet, moving)))
     seen = signals_of(system, scenario.sensors, time[before:], scenario.max_step, moving)
     readings = [
         read(sensor, np.append(_signal(sensor, system, quiet), signal), np.random.default_rng([seed, k]))
-        for k, (sensor, signal) in enumerate(zip(scenario.sensors, seen, strict=True))
+        for k, (sensor, signal) in enumerate(zip(scenario.sensors, seen))
     ]
     channels = {
         sensor.channel.name: ChannelTruth(_signal(sensor, system, history), reading.noise, reading.offset)
-        for sensor, reading in zip(scenario.sensors, readings, strict=True)
+        for sensor, reading in zip(scenario.sensors, readings)
     }
     values = np.stack([reading.values for reading in readings], axis=1)
     truth = Truth(scenario, seed, time_ns, body_truths(system, history), element_truths(system, history), channels)
@@ -130,9 +130,7 @@ def signals_of(
 
 def _test(scenario: Scenario, seed: int, readings: Sequence[Reading]) -> Test:
     noise = ", ".join(
-        f"{s.channel.name} {r.noise:.3g} {s.channel.unit}"
-        for s, r in zip(scenario.sensors, readings, strict=True)
-        if r.noise
+        f"{s.channel.name} {r.noise:.3g} {s.channel.unit}" for s, r in zip(scenario.sensors, readings) if r.noise
     )
     moving = [body for body in scenario.system.bodies if body.mass or body.motion]
     return Test(

@@ -70,4 +70,4 @@ def _element_truth(element: Element, k: int, history: History) -> ElementTruth:
 
 
 def _evaluated(law: Law, *columns: np.ndarray) -> np.ndarray:
-    return np.array([law(*row) for row in zip(*(column.tolist() for column in columns), strict=True)])
+    return np.array([law(*row) for row in zip(*(column.tolist() for column in columns))])

@@ -55,9 +55,9 @@ def as_json(
         "model": description.model,
         "method": description.method,
         "samples": len(recording),
-        "units": dict(zip(description.parameters, description.parameter_units, strict=True))
-        | dict(zip(description.equations, description.equation_units, strict=True))
-        | dict(zip(description.extra, description.extra_units, strict=True)),
+        "units": dict(zip(description.parameters, description.parameter_units))
+        | dict(zip(description.equations, description.equation_units))
+        | dict(zip(description.extra, description.extra_units)),
         "parameters": {
             name: {
                 "value": float(last.parameters[k]),
@@ -69,9 +69,7 @@ def as_json(
         },
         "besides": {
             name: {"value": value, "std": std, "unit": unit}
-            for name, unit, value, std in zip(
-                description.extra, description.extra_units, last.extra, last.extra_std, strict=True
-            )
+            for name, unit, value, std in zip(description.extra, description.extra_units, last.extra, last.extra_std)
         },
         "equations": {row.equation: row._asdict() for row in errors},
         "events": [

@@ -101,7 +101,7 @@ def as_json(
         "test": recording.test.id,
         "model": structure.name,
         "compared": filtered,
-        "equation_units": dict(zip(equations, structure.equation_units, strict=True)),
+        "equation_units": dict(zip(equations, structure.equation_units)),
         "characteristics": {law.element: law._asdict() for law in laws},
         "comparisons": {
             c.name: c._asdict()

@@ -72,4 +72,4 @@ class Corrected:
         """(channels,) each as it was at the true instant; a recording's first values stand for what was before."""
         times, values = np.array([t for t, _ in recent]), np.array([v for _, v in recent])
         wanted = instant + np.rint(self.errors.delay * 1e9)
-        return np.array([np.interp(w, times, column) for w, column in zip(wanted, values.T, strict=True)])
+        return np.array([np.interp(w, times, column) for w, column in zip(wanted, values.T)])

@@ -139,9 +139,9 @@ class Afmm:
     def _combined(self, models: tuple[Model, ...]) -> Update:
         """Mean and covariance of the mixture."""
         weights = np.exp([model.log_weight for model in models])
-        theta = sum(w * model.filter.theta for w, model in zip(weights, models, strict=True))
+        theta = sum(w * model.filter.theta for w, model in zip(weights, models))
         covariance = np.zeros((len(theta), len(theta)))
-        for w, model in zip(weights, models, strict=True):
+        for w, model in zip(weights, models):
             away = model.filter.theta - theta
             covariance += w * (model.filter.covariance + np.outer(away, away))
         ranked = sorted(models, key=lambda model: -model.log_weight)
@@ -180,4 +180,4 @@ def _likeliest(models: tuple[Model, ...]) -> Model:
 def _normalised(models: list[Model]) -> tuple[Model, ...]:
     logs = np.array([model.log_weight for model in models])
     total = logs.max() + np.log(np.exp(logs - logs.max()).sum())
-    return tuple(model._replace(log_weight=float(log - total)) for model, log in zip(models, logs, strict=True))
+    return tuple(model._replace(log_weight=float(log - total)) for model, log in zip(models, logs))

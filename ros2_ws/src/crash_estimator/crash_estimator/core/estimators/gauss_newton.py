@@ -94,11 +94,11 @@ class GaussNewton:
         p, q = ((o,) * equations if isinstance(o, int) else o for o in (self.p, self.q))
         if len(p) != equations or len(q) != equations:
             raise ModelError(f"gauss_newton needs one order for each of {equations} equations, got p {p} and q {q}")
-        return list(zip(p, q, strict=True))
+        return list(zip(p, q))
 
     def extra_names(self, equations: tuple[str, ...]) -> dict[str, str]:
         """Name -> unit of `Update.extra`: the coefficients d ("ar") and a ("ma") of each equation."""
-        named = zip(equations, self.orders(len(equations)), strict=True)
+        named = zip(equations, self.orders(len(equations)))
         return {
             f"{name}.{kind}{i + 1}": "1"
             for name, (p, q) in named
@@ -120,7 +120,7 @@ class GaussNewton:
     def _begun(self, rls: RlsState) -> RlsState:
         """With the noise models known before: d, a, their covariance and the variance of eps."""
         theta, information, carried = rls.theta.copy(), rls.information.copy(), rls.carried.copy()
-        for (d, a), model in zip(self._slices(len(self.start)), self.start, strict=True):
+        for (d, a), model in zip(self._slices(len(self.start)), self.start):
             both = slice(d.start, a.stop)
             theta[d], theta[a], carried[both, both] = model.d, model.a, model.covariance
             information[both, both] = np.linalg.inv(model.covariance)
@@ -134,7 +134,7 @@ class GaussNewton:
         equations, parameters = regression.gradient.shape
         expected, filtered = self._predict(state.rls.theta, state.past, regression)
         learning = self._learning(state, regression)
-        for (d, a), learns in zip(self._slices(equations), learning, strict=True):
+        for (d, a), learns in zip(self._slices(equations), learning):
             filtered[:, d.start : a.stop] *= learns
         theta, n = state.rls.theta[:parameters], filtered.shape[1]
         linear = regression.gradient @ theta - filtered @ state.rls.theta
@@ -193,7 +193,7 @@ class GaussNewton:
         covariance = self._rls(equations)._covariance(state.rls)
         return [
             NoiseModel(state.rls.theta[d], state.rls.theta[a], covariance[d.start : a.stop, d.start : a.stop], float(v))
-            for (d, a), v in zip(self._slices(equations), state.rls.residual_variance, strict=True)
+            for (d, a), v in zip(self._slices(equations), state.rls.residual_variance)
         ]
 
     def _predict(

@@ -76,7 +76,7 @@ class Kalman:
         always = np.ones(len(offsets), dtype=bool)
         prior = np.hstack([root, self._walk(theta, regression, len(offsets))])
         target = regression.measured - regression.known
-        equations = [(psi, y, r) for psi, y, r in zip(gradient, target, noise, strict=True) if not np.isnan(y)]
+        equations = [(psi, y, r) for psi, y, r in zip(gradient, target, noise) if not np.isnan(y)]
 
         def assimilate(theta: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             """The equations' errors are independent, so they update in turn, each with a scalar to divide by."""

@@ -58,7 +58,7 @@ class OrderBank:
         seen = state.seen + ~np.isnan(regression.measured)
         count = (seen > SETTLING) & ~np.isnan(regression.measured)
         states, updates, squares = [], [], state.squares.copy()
-        for k, (member, before) in enumerate(zip(self.members, state.members, strict=True)):
+        for k, (member, before) in enumerate(zip(self.members, state.members)):
             theta = before.rls.theta[: len(self.settings.initial)]
             after, update = member.update(before, regression)
             error = regression.measured - regression.known - regression.gradient @ theta - update.expected_error[0]

@@ -215,7 +215,7 @@ class Rls:
 
     def _covariance(self, state: RlsState) -> np.ndarray:
         covariance = state.carried.copy()
-        for part, variance in zip(state.influence, state.variances, strict=True):
+        for part, variance in zip(state.influence, state.variances):
             covariance += part * variance @ part.T
         return 0.5 * (covariance + covariance.T)
 

@@ -122,7 +122,7 @@ def distance(specimen: Specimen, other: Specimen, besides: str = "") -> float:
     besides: a channel that is left out.
     """
     total = 0.0
-    for ours, theirs in zip(_recorded(specimen), _recorded(other), strict=True):
+    for ours, theirs in zip(_recorded(specimen), _recorded(other)):
         total += sum(np.sum((ours[c] - theirs[c]) ** 2) for c in (ours.keys() & theirs.keys()) - {besides})
     return float(np.sqrt(total * specimen.scenario.rate / COARSE_RATE))
 
@@ -189,5 +189,5 @@ def _recorded(specimen: Specimen) -> list[dict[str, np.ndarray]]:
     runs = []
     for speed in SPEEDS:
         signals = signals_of(scenario.system.at_speed(speed), sensors, time, COARSE_STEP)
-        runs.append({s.channel.name: x / NOISE[s.channel.quantity] for s, x in zip(sensors, signals, strict=True)})
+        runs.append({s.channel.name: x / NOISE[s.channel.quantity] for s, x in zip(sensors, signals)})
     return runs

@@ -93,20 +93,17 @@ def peaks_of(specimen: Specimen) -> Peaks:
     drop = np.max([1.0 - run.force[-20:].min(0) / np.maximum(run.force.max(0), 1.0) for run in runs], axis=0)
     travel = np.max([np.abs(run.crush * (run.force != 0.0)).max(0) for run in runs], axis=0)
     return Peaks(
-        force=dict(zip(names, force.tolist(), strict=True)),
-        crush=dict(zip(names, np.max([run.crush.max(0) for run in runs], axis=0).tolist(), strict=True)),
-        travel=dict(zip(names, travel.tolist(), strict=True)),
+        force=dict(zip(names, force.tolist())),
+        crush=dict(zip(names, np.max([run.crush.max(0) for run in runs], axis=0).tolist())),
+        travel=dict(zip(names, travel.tolist())),
         rate=dict(
             zip(
                 names,
                 np.max([np.abs(run.rate * (run.force != 0.0)).max(0) for run in runs], axis=0).tolist(),
-                strict=True,
             )
         ),
-        drop=dict(zip(names, drop.tolist(), strict=True)),
-        acceleration=dict(
-            zip(bodies, np.max([np.abs(run.acceleration).max(0) for run in runs], axis=0).tolist(), strict=True)
-        ),
+        drop=dict(zip(names, drop.tolist())),
+        acceleration=dict(zip(bodies, np.max([np.abs(run.acceleration).max(0) for run in runs], axis=0).tolist())),
     )
 
 

@@ -124,7 +124,7 @@ def _specimen(  # noqa: PLR0913 - the parts that a structure is told by
     barrier = [b.name for b in bodies if b.name == "barrier"]
     sensors = [accelerometer(f"{b.name}_a{axis}", b.name) for b in moving]
     sensors += [load_cell_barrier(f"{b}_f{axis}", b) for b in barrier]
-    elements, told = zip(*(_element(rng, part) for part in parts), strict=True)
+    elements, told = zip(*(_element(rng, part) for part in parts))
     scenario = Scenario(
         name, f"Simulated: {STRUCTURES[name].__doc__.rstrip('.')}", System(bodies, tuple(elements)),
         (*sensors, *measured), duration, max_step=STEP,
@@ -132,9 +132,7 @@ def _specimen(  # noqa: PLR0913 - the parts that a structure is told by
     model = {
         "name": name,
         "bodies": {b.name: _model_body(b, axis, bool(measured)) for b in bodies},
-        "elements": {
-            e.name: model_element(e, t, part.stiffness) for e, t, part in zip(elements, told, parts, strict=True)
-        },
+        "elements": {e.name: model_element(e, t, part.stiffness) for e, t, part in zip(elements, told, parts)},
     }
     if measured:
         displacement, velocity = (sensor.channel.name for sensor in measured)

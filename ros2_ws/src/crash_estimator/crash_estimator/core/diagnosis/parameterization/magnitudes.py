@@ -66,7 +66,7 @@ class Magnitudes(NamedTuple):
         """Knots and crush scale of the curve between an attached body and the one that it pushes."""
         body = self.structure.body_index[addition.touches]
         low, high = 0.0, 0.0
-        for record, measured in zip(self.records, self.measured, strict=True):
+        for record, measured in zip(self.records, self.measured):
             x = measured.x[:, body] - attached_motion(self.structure, record, addition)[2]
             low, high = min(low, float(x.min())), max(high, float(x.max()))
         crush = max(high - low, self.shortest_crush)
@@ -75,7 +75,7 @@ class Magnitudes(NamedTuple):
     def touching_damping(self, addition) -> float:
         """Scale of a damper beside that curve, N s/m."""
         body, rate = self.structure.body_index[addition.touches], 1e-3
-        for record, measured in zip(self.records, self.measured, strict=True):
+        for record, measured in zip(self.records, self.measured):
             v = measured.v[:, body] - attached_motion(self.structure, record, addition)[1]
             rate = max(rate, float(np.abs(v).max()))
         return self.host_force(addition) / rate
@@ -126,7 +126,7 @@ def measure_magnitudes(
     elements = range(len(structure.elements))
     crush_range, rate = np.zeros((len(elements), 2)), np.full(len(elements), 1e-3)
     for k in elements:
-        for record, trajectory in zip(records, measured, strict=True):
+        for record, trajectory in zip(records, measured):
             motion = element_motion(structure, record, trajectory, k)
             crush_range[k, 0] = min(crush_range[k, 0], motion.crush.min())
             crush_range[k, 1] = max(crush_range[k, 1], motion.crush.max())

@@ -30,7 +30,6 @@ class Builder:
         for column, item in zip(
             (self.names, self.start, self.std, self.mean, self.low, self.high),
             (name, start, std, mean, low, high),
-            strict=True,
         ):
             column.append(item)
         return len(self.start) - 1

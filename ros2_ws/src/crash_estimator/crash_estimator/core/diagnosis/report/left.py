@@ -79,10 +79,7 @@ def band_of(model: Model) -> int | None:
     for cfc in sorted(CFC_CLASSES):
         if period * cfc * RATE_PER_CFC > 1.0:
             return None
-        kept = [
-            _kept(each, record.period, cfc)
-            for each, record in zip(model.residuals.predicted, model.records, strict=True)
-        ]
+        kept = [_kept(each, record.period, cfc) for each, record in zip(model.residuals.predicted, model.records)]
         if min(kept) > SPOKEN_FOR:
             return cfc
     return None

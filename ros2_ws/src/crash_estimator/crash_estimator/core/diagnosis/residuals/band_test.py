@@ -58,7 +58,7 @@ def band_test(residuals, noise_samples, periods) -> BandTest:
     """residuals: per record (n, q) in standard deviations of the noise, NaN where not valid; noise_samples (q,) per
     record; periods: s between samples, per record."""
     found = []
-    for r, (residual, samples, period) in enumerate(zip(residuals, noise_samples, periods, strict=True)):
+    for r, (residual, samples, period) in enumerate(zip(residuals, noise_samples, periods)):
         for q in range(residual.shape[1]):
             z = residual[:, q]
             power, bands = _bands(z[np.isfinite(z)], period, EDGES)
@@ -77,7 +77,7 @@ def band_test_of_fit(records: Sequence[Sequence[Absorbed]], noise_samples) -> Ba
     distribution of m / v chi^2 with v = m^2 / tr C_B^2 degrees of freedom (Satterthwaite).
     """
     found = []
-    for r, (outputs, samples) in enumerate(zip(records, noise_samples, strict=True)):
+    for r, (outputs, samples) in enumerate(zip(records, noise_samples)):
         for q, one in enumerate(outputs):
             power, bands = _bands(one.residual, one.period, ABSORBING)
             root = dct(one.root, norm="ortho", axis=0)

@@ -65,11 +65,11 @@ def _runs(outside: np.ndarray, length: int) -> list[tuple[int, int]]:
     if not len(index):
         return []
     breaks = np.flatnonzero(np.diff(index) > length)
-    return list(zip(index[np.r_[0, breaks + 1]].tolist(), index[np.r_[breaks, len(index) - 1]].tolist(), strict=True))
+    return list(zip(index[np.r_[0, breaks + 1]].tolist(), index[np.r_[breaks, len(index) - 1]].tolist()))
 
 
 def _state(layout: Layout, residuals: Residuals, r: int, body: int, at: np.ndarray) -> str:
-    mine = [force for link, force in zip(layout.links, residuals.links[r], strict=True) if body in link.ends]
+    mine = [force for link, force in zip(layout.links, residuals.links[r]) if body in link.ends]
     if not mine:
         return ElementState.APART.name.lower()
     busiest = max(mine, key=lambda force: float(np.abs(force.force[at]).mean()))

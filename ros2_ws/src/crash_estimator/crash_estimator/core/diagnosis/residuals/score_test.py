@@ -70,7 +70,7 @@ def drift_of(fitted: Fit) -> Drift:
     except LinAlgError:  # a motion without bounds: nothing can be said of it
         return Drift(True, 1.0, names[0], 0.0)
     blocks = [slice(first, first + MODES) for first in range(0, len(score), MODES)]
-    found = [(*_statistic(score[b], information[b, b]), name) for b, name in zip(blocks, names, strict=True)]
+    found = [(*_statistic(score[b], information[b, b]), name) for b, name in zip(blocks, names)]
     square, freedom, _ = max(found)
     least = min(float(chdtrc(f, s)) for s, f, _ in found)
     probability = float(-np.expm1(len(found) * np.log1p(-min(least, 1.0 - 1e-12))))
