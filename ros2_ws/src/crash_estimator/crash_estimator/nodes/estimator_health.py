@@ -40,7 +40,7 @@ def filter_health(latest: Columns, description: Description) -> dict[str, object
     side = round(len(flat) ** 0.5)
     found = covariance_health(flat.reshape(side, side))
     status = latest.of["status"][-1]
-    clamped = [name for name, its in zip(description.parameters, status, strict=True) if its == ParameterStatus.CLAMPED]
+    clamped = [name for name, its in zip(description.parameters, status) if its == ParameterStatus.CLAMPED]
     return {
         "estimates finite": found.finite and bool(np.isfinite(latest.of["value"][-1]).all()),
         "covariance positive": found.positive,
