@@ -41,13 +41,13 @@ def member(parameters: ParameterBlock, residuals: ResidualBlock, forces: ForceBl
     """An estimator's names from its first block of each kind."""
     status = parameters.status[0]
     estimated = (~np.isin(status, (ParameterStatus.KNOWN, ParameterStatus.METHOD))).tolist()
-    pairs = list(zip(parameters.name, parameters.unit, strict=True))
+    pairs = list(zip(parameters.name, parameters.unit))
     return Member(
         name=parameters.estimator,
         model=parameters.model,
         method=parameters.method,
         parameters=tuple(pair for pair, shown in zip(pairs, estimated, strict=True) if shown),
-        equations=tuple(zip(residuals.name, residuals.unit, strict=True)),
+        equations=tuple(zip(residuals.name, residuals.unit)),
         elements=forces.element,
         between=tuple(_ends(between, forces.body) for between in forces.between),
         bodies=forces.body,
@@ -132,9 +132,7 @@ class Cast:
 
     def inputs_of(self, body: str) -> tuple[str, ...]:
         """Crush and rate of every element at a body: the inputs of its equation."""
-        at = dict.fromkeys(
-            e for m in self.members for e, ends in zip(m.elements, m.between, strict=True) if body in ends
-        )
+        at = dict.fromkeys(e for m in self.members for e, ends in zip(m.elements, m.between) if body in ends)
         return tuple(f"{element}.{kind}" for element in at for kind in ("crush", "rate"))
 
     @property

@@ -15,7 +15,7 @@ MOMENT = "s"
 
 def write(pen: Pen, block: ParameterBlock) -> None:
     """One plot for each kind of quantity: all weights together, all "ar" coefficients together."""
-    for k, (name, unit) in enumerate(zip(block.name, block.unit, strict=True)):
+    for k, (name, unit) in enumerate(zip(block.name, block.unit)):
         if block.status[0, k] == ParameterStatus.METHOD and unit != MOMENT:
             color = ESTIMATOR_COLORS[_place(block, name) % len(ESTIMATOR_COLORS)]
             value, std = block.value[:, k], block.std[:, k]

@@ -40,7 +40,7 @@ def cast_with(cast: Cast, finding: Finding) -> Cast:
     if isinstance(finding, RankingBlock) and finding.revision not in cast.rankings:
         return replace(cast, rankings=cast.rankings + (finding.revision,))
     if isinstance(finding, RevisionBlock):
-        outputs = tuple(zip(finding.name, finding.unit, strict=True))
+        outputs = tuple(zip(finding.name, finding.unit))
         cast = replace(cast, outputs=outputs, revisions_whole=cast.revisions_whole or finding.final)
     return cast
 

@@ -150,7 +150,7 @@ class Motion:
         time_ns = time_ns + self.drawn_again
         shift = REST * crush @ lane.positions.T / scale.length  # (frames, bodies)
         at = {}
-        for k, (body, mass) in enumerate(zip(member.bodies, member.masses, strict=True)):
+        for k, (body, mass) in enumerate(zip(member.bodies, member.masses)):
             if body not in figure.columns:
                 continue
             x = figure.columns[body] * PITCH + shift[:, k]

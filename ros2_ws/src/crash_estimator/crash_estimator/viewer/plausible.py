@@ -50,7 +50,7 @@ class Limits:
     def force(self, block: ForceBlock) -> float:
         """N, what an element may carry by the accelerations measured so far; infinite where none is measured."""
         limit = 0.0
-        for k, (body, mass) in enumerate(zip(block.body, block.mass, strict=True)):
+        for k, (body, mass) in enumerate(zip(block.body, block.mass)):
             if mass > 0:  # not NaN
                 limit += mass * self._largest_of(block.estimator, f"{body}'s acceleration", block.acceleration[:, k])
         return FORCE * float(limit) or np.inf
