@@ -145,8 +145,10 @@ def test_a_report_is_a_page_and_no_more(hostile, monkeypatch, capsys, tmp_path):
     assert r"x1b" in page and all(line.isprintable() for line in page.split("\n"))
     prose = re.sub(r"```.*?```|`[^`\n]*`", "", page, flags=re.DOTALL)
     assert "<" not in page and "[x](" not in prose and "![y]" not in prose and "**#" not in prose
-    rows = [line.replace(r"\|", "") for line in page.splitlines() if line.startswith("|")]
-    assert len({line.count("|") for line in rows}) == 1, "a name makes no column"
+    tables = re.findall(r"(?:^\|.*\n)+", page.replace(r"\|", ""), re.MULTILINE)
+    for table in tables:
+        assert len({line.count("|") for line in table.splitlines()}) == 1, "a name makes no column"
+    assert tables
 
 
 def test_a_demonstration_announces_it_on_lines_of_its_own(hostile, capsys):

@@ -34,9 +34,10 @@ def help_text(name: str, about: str, parameters: Mapping[str, Allowed]) -> str:
 
 def _meaning(allowed: Allowed) -> str:
     default = allowed.default
+    meaning = f"{allowed.meaning}; may be set at any time" if allowed.live else allowed.meaning
     if default in ("", [""]):
-        return allowed.meaning
+        return meaning
     shown = (
         str(default).lower() if isinstance(default, bool) else f"{default:g}" if isinstance(default, float) else default
     )
-    return f"{allowed.meaning}; default {shown}"
+    return f"{meaning}; default {shown}"

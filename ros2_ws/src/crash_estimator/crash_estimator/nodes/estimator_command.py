@@ -13,9 +13,11 @@ from crash_replay.node_program import node_program
 
 from .estimator_parameters import table_for
 
+PARAMETERS = table_for({})
+
 
 def main() -> int:
-    return node_program("estimator", __doc__, table_for({}), "crash_estimator.nodes.estimator_node")
+    return node_program("estimator", __doc__, PARAMETERS, "crash_estimator.nodes.estimator_node")
 
 
 if __name__ == "__main__":
