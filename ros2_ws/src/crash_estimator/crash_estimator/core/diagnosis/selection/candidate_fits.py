@@ -198,7 +198,7 @@ class _Search:
     def out_of_reach(self) -> bool:
         """What is left is so much more than noise that nothing makes noise of it."""
         samples = sum(record.bins * record.measured.shape[1] for record in self.model.records)
-        return self.least > THRESHOLDS.real_structure * samples
+        return self.least > THRESHOLDS.out_of_reach * samples
 
     def ranking(self) -> list[CandidateFit]:
         """Fitted ones first: a screened gain is an estimate, and does not rank above a fit that has gained anything."""
