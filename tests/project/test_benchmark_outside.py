@@ -23,7 +23,7 @@ def test_what_is_true_stands_in_a_recording_s_name(tmp_path):
     damped, undamped, *car = outside.cases(tmp_path)
     assert (damped.name, damped.truth) == ("impactor, 15 N/mm, 6 m/s, damped", "a damper of 46.8 N s/m")
     assert (undamped.name, undamped.truth) == ("impactor, 45 N/mm, 3 m/s, undamped", "no damper")
-    assert [case.cfc for case in car] == [None, 60]
+    assert [case.name for case in car] == ["NHTSA 10146", "NHTSA 10146, CFC 60"]
     damper = ("viscous_damping", "spring", 44.0)
     assert damped.right(found("effect_missing", damper)) and not damped.right(found("unexplained", damper))
     assert not damped.right(found("effect_missing", ("viscous_damping", "spring", 41.0)))
@@ -49,5 +49,5 @@ def test_a_real_damper_is_named_and_its_rivals_with_it():
         case for case in outside.cases(DATA) if case.name == "impactor, 15 N/mm, 6 m/s, damped" and "46.8" in case.truth
     )
     name, truth, told, _, _, right, _ = outside.judged(case)
-    assert told.startswith("`effect_missing`: viscous_damping on spring 44") and right == "yes", (name, truth, told)
+    assert told.startswith("`effect_missing`: viscous_damping on spring 5") and right == "yes", (name, truth, told)
     assert "coulomb_friction on spring" in told

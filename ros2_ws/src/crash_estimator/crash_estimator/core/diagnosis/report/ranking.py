@@ -137,6 +137,7 @@ def step_of(
     best = step.candidates[0]
     value, std, shape = stated(of_all.layout.term(best.addition), of_all)
     floor = noise_floor(before.fit.layout, before.records)
+    changed = best.fit if step.before.fit.problem.noise_is_inflated else after.fit
     return StepReport(
         *best.addition.key, value, std, best.addition.effect.unit, float(best.gain),
         explained=float(np.clip(1.0 - after.residuals.mean_square / before.residuals.mean_square, 0.0, 1.0)),
@@ -145,7 +146,7 @@ def step_of(
             "before": before.residuals.rms, "after": after.residuals.rms, "noise_floor": floor, "unit": "m/s^2",
         },
         free_run_rms={"before": free_run_rms[0], "after": free_run_rms[1]},
-        force_explained=_force_explained(step.before.fit, after.fit),
+        force_explained=_force_explained(step.before.fit, changed),
     )  # fmt: skip
 
 
