@@ -21,10 +21,10 @@ CHECKED = $(patsubst %,tests/core/test_%.py,discretize effects estimators factor
 	tests/replay tests/viewer tests/nodes tests/commands/test_demo_story.py \
 	tests/commands/test_diagnose_command.py tests/project/test_architecture.py tests/project/test_package_xml.py
 
-# A file's tests are run by one of two processes; -n 0 in PYTEST_ARGS: all by one. What is compiled is so once, before.
 check: lint # for every save: style, types, and the tests that need no ROS graph, no other process and little time
 	@$(PYTEST) -n 2 --dist loadfile -q --no-graph $(CHECKED)
 
+# A file's tests are run by one of two processes; -n 0 in PYTEST_ARGS: all by one. What is compiled is so once, before.
 test: lint # all tests, style and types first; some of them with PYTEST_ARGS="-k name"
 	@tools/screenshot-libs
 	@tools/env python -m crash_estimator.warm_up

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from crash_msgs.msg import ParametersBlock, ResidualsBlock
 from crash_msgs.srv import GetEstimates
-from helpers_replay import Listener, environment
+from helpers_replay import Listener, OfTheTest, environment
 from helpers_waiting import PATIENCE
 from mcap.reader import make_reader
 
@@ -26,8 +26,8 @@ def says_of_itself(file: Path) -> dict[str, str]:
         return next(r.metadata for r in make_reader(stream).iter_metadata() if r.name == "crash_replay")
 
 
-class Record:
-    """`record` with its output; killed with the test."""
+class Record(OfTheTest):
+    """`record` with its output."""
 
     def __init__(self, file: Path, limit: int | None = None, **parameters):
         """limit: bytes that it may write into a file."""
@@ -45,14 +45,6 @@ class Record:
         output, errors = self.process.communicate(timeout=timeout)
         logged = [line for line in errors.splitlines() if not line.startswith("[") and "RTPS_" not in line]
         return self.process.returncode, output.strip(), "\n".join(logged)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        if self.process.poll() is None:
-            self.process.kill()
-            self.process.communicate()
 
 
 class Estimator(Listener):

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from tempfile import TemporaryFile
 from threading import Thread
 
 import numpy as np
@@ -48,28 +49,10 @@ def environment() -> dict[str, str]:
     return {**os.environ, "ROS_DOMAIN_ID": str(DOMAIN)}
 
 
-class Replay:
-    """`replay` on a bag, with its output; ended with the test."""
+class OfTheTest:
+    """A process that ends with the test."""
 
-    def __init__(self, bag=None, remap: Sequence[str] = (), **parameters):
-        """remap: such as __ns:=/sled_a."""
-        command = [sys.executable, "-m", "crash_replay.replay_node", "--ros-args"]
-        command += [word for rule in remap for word in ("-r", rule)]
-        for name, value in {**({"bag": bag} if bag else {}), **parameters}.items():
-            shown = [str(one) for one in value] if isinstance(value, list) else value
-            command += ["-p", f"{name}:={str(shown).lower() if isinstance(shown, bool) else shown}"]
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        self.process = subprocess.Popen(command, env=environment(), text=True, **pipes)
-
-    def end(self, timeout: float = PATIENCE) -> tuple[int, str, str]:
-        output, errors = self.process.communicate(timeout=timeout)
-        # what processes that were killed have left in shared memory makes Fast DDS complain, to nobody's harm
-        output = "".join(line for line in output.splitlines(keepends=True) if "RTPS_" not in line)
-        return self.process.returncode, output, errors
-
-    def interrupt(self) -> tuple[int, str, str]:
-        self.process.send_signal(signal.SIGINT)
-        return self.end()
+    process: subprocess.Popen
 
     def __enter__(self):
         return self
@@ -78,6 +61,40 @@ class Replay:
         if self.process.poll() is None:
             self.process.kill()
             self.process.communicate()
+
+
+class Replay(OfTheTest):
+    """`replay` on a bag, with its output."""
+
+    def __init__(self, bag=None, remap: Sequence[str] = (), **parameters):
+        """remap: such as __ns:=/sled_a."""
+        command = [sys.executable, "-m", "crash_replay.replay_node", "--ros-args"]
+        command += [word for rule in remap for word in ("-r", rule)]
+        for name, value in {**({"bag": bag} if bag else {}), **parameters}.items():
+            shown = [str(one) for one in value] if isinstance(value, list) else value
+            command += ["-p", f"{name}:={str(shown).lower() if isinstance(shown, bool) else shown}"]
+        self.errors = TemporaryFile()  # noqa: SIM115, closed when the process has ended
+        pipes = {"stdout": subprocess.PIPE, "stderr": self.errors}
+        self.process = subprocess.Popen(command, env=environment(), text=True, **pipes)
+
+    def __exit__(self, *_):
+        super().__exit__()
+        self.errors.close()
+
+    def errors_so_far(self) -> str:
+        return os.pread(self.errors.fileno(), 1_000_000, 0).decode()
+
+    def end(self, timeout: float = PATIENCE) -> tuple[int, str, str]:
+        output, _ = self.process.communicate(timeout=timeout)
+        # what processes that were killed have left in shared memory makes Fast DDS complain, to nobody's harm
+        output = "".join(line for line in output.splitlines(keepends=True) if "RTPS_" not in line)
+        errors = self.errors_so_far()
+        self.errors.close()
+        return self.process.returncode, output, errors
+
+    def interrupt(self) -> tuple[int, str, str]:
+        self.process.send_signal(signal.SIGINT)
+        return self.end()
 
 
 class Listener:

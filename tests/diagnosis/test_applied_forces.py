@@ -206,6 +206,22 @@ def test_a_derivative_follows_what_moves_and_leaves_the_noise():
 
 
 @pytest.mark.parametrize(
+    "channel, valid, said",
+    [
+        ("axis_x", 0, "axis_x has no valid sample"),
+        ("motor_fx", 0, "motor_fx has no valid sample"),
+        ("motor_fx", 1, "needs two valid samples"),
+    ],
+)
+def test_a_channel_without_samples_is_one_line(model, channel, valid, said):
+    record = pushed_axis(0.0)
+    record.values[valid:, record.test.index(channel)] = np.nan
+    with pytest.raises(ModelError, match=said) as caught:
+        diagnose(model(AXIS), [record])
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
     "body, said",
     [
         ("{fixed: true, applied: motor_fx}", "`applied` belongs to a free body"),

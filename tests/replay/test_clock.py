@@ -4,12 +4,11 @@ import signal
 import time
 from types import SimpleNamespace
 
-import pytest
 from helpers_replay import Listener, Replay, some_recording, wait_until
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from crash_replay.bag import time_zero_ns, write_bag
+from crash_replay.bag import time_zero_ns
 from crash_replay.player import Batch
 from crash_replay.qos import STREAM
 from crash_replay.replay_topics import ReplayTopics
@@ -17,17 +16,6 @@ from crash_replay.ros_messages import stamp_ns
 
 RECORDING = some_recording()
 STAMPS = (RECORDING.time_ns + time_zero_ns(RECORDING)).tolist()
-
-
-@pytest.fixture(scope="module")
-def bag(tmp_path_factory):
-    return write_bag(RECORDING, tmp_path_factory.mktemp("bags") / "some.mcap")
-
-
-@pytest.fixture
-def listener():
-    with Listener() as listener:
-        yield listener
 
 
 def clocks_of(listener) -> list[int]:

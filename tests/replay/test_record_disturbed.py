@@ -13,11 +13,6 @@ from crash_replay import record_killed
 from crash_replay.bag import read_bag, write_bag
 
 
-@pytest.fixture
-def bag(tmp_path):
-    return write_bag(some_recording(), tmp_path / "b.mcap")
-
-
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
 def test_a_signal_ends_it_in_time_with_a_whole_file(bag, tmp_path, number):
     file = tmp_path / "e.mcap"

@@ -14,18 +14,13 @@ from crash_msgs.msg import Attendance as Word
 from crash_msgs.msg import Ranking
 from crash_msgs.srv import Step
 from helpers_record import Estimator, Record, messages, says_of_itself
-from helpers_replay import Listener, Replay, environment, some_recording, wait_until
+from helpers_replay import Listener, Replay, environment, wait_until
 from helpers_waiting import PATIENCE
 
-from crash_replay.bag import read_bag, write_bag
+from crash_replay.bag import read_bag
 from crash_replay.processes import this_host
 from crash_replay.qos import SAID
 from crash_replay.record_node import RecordError, opened
-
-
-@pytest.fixture
-def bag(tmp_path):
-    return write_bag(some_recording(), tmp_path / "b.mcap")
 
 
 @pytest.mark.parametrize(

@@ -103,6 +103,16 @@ def test_who_is_waited_for_is_said_within_a_second_and_not_with_every_message():
     assert len(warnings) == 2
 
 
+def test_another_one_that_is_waited_for_is_said_at_once():
+    publisher, slow, warnings = Publisher(), ["/slow"], []
+    publisher.acknowledged = False
+    flow = Flow(lambda: [publisher], warnings.append, lambda: slow[0])
+    flow.all_taken(50.0), flow.all_taken(50.9)
+    slow[0] = "/other, which was killed"
+    flow.all_taken(51.0), flow.all_taken(51.8), flow.all_taken(52.7)
+    assert [line.split("for ")[1] for line in warnings] == ["/slow", "/other, which was killed"]
+
+
 def test_it_says_so_when_a_subscriber_takes_nothing_and_goes_on():
     publisher = Publisher()
     publisher.acknowledged = False

@@ -26,17 +26,6 @@ RECORDING = some_recording()  # 40 samples at 1 kHz, the impact at number 10
 FINISHED = r"finished: 40 samples sent in 40 messages, rate [\d.]+ of 1 asked for, at worst [\d.]+ ms late\n"
 
 
-@pytest.fixture(scope="module")
-def bag(tmp_path_factory):
-    return write_bag(RECORDING, tmp_path_factory.mktemp("bags") / "some.mcap")
-
-
-@pytest.fixture
-def listener():
-    with Listener() as listener:
-        yield listener
-
-
 def test_a_whole_replay(bag, listener):
     """Every sample, every channel, the test and the state."""
     channels = [[] for _ in RECORDING.test.channels]

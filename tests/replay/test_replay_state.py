@@ -4,25 +4,14 @@ import numpy as np
 import pytest
 from crash_msgs.msg import ReplayState
 from crash_msgs.srv import Burst, Step
-from helpers_replay import Listener, Replay, some_recording, wait_until
+from helpers_replay import Replay, some_recording, wait_until
 from helpers_waiting import PATIENCE
 from std_srvs.srv import Trigger
 
-from crash_replay.bag import time_zero_ns, write_bag
+from crash_replay.bag import time_zero_ns
 from crash_replay.ros_messages import stamp_ns
 
 RECORDING = some_recording()  # 40 samples at 1 kHz, the impact at number 10
-
-
-@pytest.fixture(scope="module")
-def bag(tmp_path_factory):
-    return write_bag(RECORDING, tmp_path_factory.mktemp("bags") / "some.mcap")
-
-
-@pytest.fixture
-def listener():
-    with Listener() as listener:
-        yield listener
 
 
 def test_steps_asked_for_at_once_add_up(bag, listener):

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 
 import pytest
 from crash_msgs.srv import Burst
-from helpers_replay import Listener, Replay, some_recording, wait_until
+from helpers_replay import Replay, some_recording, wait_until
 from std_srvs.srv import Trigger
 
-from crash_replay.bag import time_zero_ns, write_bag
+from crash_replay.bag import time_zero_ns
 from crash_replay.pacing import Pacing
 from crash_replay.player import Mode, Player
 from crash_replay.ros_messages import stamp
@@ -16,17 +16,6 @@ from crash_replay.rosbag2_services import Services, as_its_types
 
 RECORDING = some_recording()  # 40 samples, the impact at number 10
 ITS_TYPES = importlib.util.find_spec("rosbag2_interfaces") is not None
-
-
-@pytest.fixture(scope="module")
-def bag(tmp_path_factory):
-    return write_bag(RECORDING, tmp_path_factory.mktemp("bags") / "some.mcap")
-
-
-@pytest.fixture
-def listener():
-    with Listener() as listener:
-        yield listener
 
 
 def test_its_names_beside_ours(bag, listener):

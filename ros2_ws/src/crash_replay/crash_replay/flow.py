@@ -16,8 +16,8 @@ heartbeat Fast DDS searches what a reader holds: at 500 that takes longer than w
 BYTES = 250_000
 """Bytes that may be on their way: half of what Fast DDS holds between processes; what exceeds it is sent again."""
 SAY_AFTER, SAY_AGAIN = 0.8, 30.0
-"""Seconds of waiting after which it is said who for.
-Seconds between two such lines: one that is slow is waited for again and again."""
+"""Seconds of waiting after which it is looked, again and again, who for.
+Seconds between two such lines about the same ones: one that is slow is waited for again and again."""
 PATIENCE = 10.0
 """Seconds to wait for a subscriber that takes nothing; one that was killed is forgotten before, see `obituary`."""
 PATIENCE_AGAIN = 0.2
@@ -47,7 +47,8 @@ class Flow:
         self.messages = self.bytes = 0  # since all was acknowledged
         self.patience = PATIENCE  # s
         self.waiting_since: float | None = None
-        self.said = -SAY_AGAIN  # when, who for
+        self.looked = 0.0  # when it was last asked who is waited for
+        self.said, self.said_of = -SAY_AGAIN, ""  # when, of whom
 
     def sent(self, messages: int, size: int) -> None:
         self.messages += messages
@@ -78,10 +79,15 @@ class Flow:
             return True
         if self.waiting_since is None:
             self.waiting_since = now
-        if now - self.waiting_since > SAY_AFTER and now - self.said > SAY_AGAIN:
-            self.said = now
-            self.warn(f"what was sent is not taken: waiting for {self.waited_for()}")
+        if now - max(self.waiting_since, self.looked) > SAY_AFTER:
+            self._say_who(now)
         return False
+
+    def _say_who(self, now: float) -> None:
+        self.looked, who = now, self.waited_for()
+        if who != self.said_of or now - self.said > SAY_AGAIN:
+            self.said, self.said_of = now, who
+            self.warn(f"what was sent is not taken: waiting for {who}")
 
     def acknowledged(self) -> bool:
         """Whether every reliable subscriber has got everything."""

@@ -33,9 +33,10 @@ def import_report(recording: Recording) -> str:
 
 def _channels(recording: Recording) -> list[str]:
     peaks = _peaks(recording)
-    scale = {q: scale_of(q, [value for c, (value, _) in zip(recording.test.channels, peaks) if c.quantity
-    == q])
-             for q in {channel.quantity for channel in recording.test.channels}}  # fmt: skip
+    values: dict[str, list[float]] = {}
+    for channel, (value, _) in zip(recording.test.channels, peaks):
+        values.setdefault(channel.quantity, []).append(value)
+    scale = {quantity: scale_of(quantity, found) for quantity, found in values.items()}
     rows = [("channel", "body", "quantity", "peak", "", "at")]
     for channel, (value, at) in zip(recording.test.channels, peaks):
         unit, factor = scale[channel.quantity]

@@ -5,6 +5,7 @@ in their programs alone: who imports them from a program of his own keeps his si
 before that; who starts a program with `held` signals makes them wait until then.
 """
 
+import atexit
 import os
 import signal
 import sys
@@ -32,6 +33,14 @@ def begin() -> None:
         if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):  # nohup is respected
             signal.signal(number, leave)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
+    atexit.register(end)
+
+
+def end() -> None:
+    """It is through, and its exit status stands: Python takes its handlers down now, and a signal would kill it."""
+    for number in ENDING:
+        if callable(signal.getsignal(number)):
+            signal.signal(number, signal.SIG_IGN)
 
 
 def leave(number: int, _) -> None:

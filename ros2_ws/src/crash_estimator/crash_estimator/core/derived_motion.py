@@ -14,7 +14,8 @@ from scipy.signal import savgol_filter
 
 from crash_replay.recording import Channel, Recording
 
-from .structure import Body, Structure
+from .sensor_noise import by_differences
+from .structure import Body, ModelError, Structure
 
 ORDER = 4
 """Of the local polynomial: its second derivative is a parabola, as an acceleration between its inflections is."""
@@ -59,7 +60,9 @@ def _with_acceleration(recording: Recording, body: Body, name: str) -> Recording
     test = recording.test
     values = recording.column(body.motion_channel)
     valid = np.isfinite(values)
-    bridged = np.interp(recording.time, recording.time[valid], values[valid]) if valid.any() else values
+    if not valid.any():
+        raise ModelError(f"test {test.id}: channel {body.motion_channel} has no valid sample")
+    bridged = np.interp(recording.time, recording.time[valid], values[valid])
     found = smoothed(bridged, recording.sample_period)
     start = int(np.searchsorted(recording.time_ns, 0))
     start = min(start, len(values) - 1)
@@ -81,7 +84,10 @@ def _with_acceleration(recording: Recording, body: Body, name: str) -> Recording
 def smoothed(values: np.ndarray, period: float) -> Smoothed:
     """Of values (n,) on an even grid of `period` s."""
     best = WINDOWS[0]
-    noise = _white_noise(values)
+    if len(values) < best:
+        nothing = np.full_like(values, np.nan)
+        return Smoothed(values, nothing, nothing)
+    noise = by_differences(values)
     for window in WINDOWS:
         if window > len(values):
             break
@@ -90,24 +96,17 @@ def smoothed(values: np.ndarray, period: float) -> Smoothed:
         if float(np.std(values - kept)) > FOLLOWS * noise * np.sqrt(share):
             break
         best = window
-    if len(values) < best:
-        nothing = np.full_like(values, np.nan)
-        return Smoothed(values, nothing, nothing)
     return Smoothed(*(savgol_filter(values, best, ORDER, deriv=k, delta=period) for k in range(3)))
-
-
-def _white_noise(values: np.ndarray) -> float:
-    """Standard deviation of white noise in values, from their sixth difference, which is blind to what is slow."""
-    coefficients = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0])
-    found = np.convolve(values, coefficients / np.linalg.norm(coefficients), "valid")
-    return float(np.median(np.abs(found))) / 0.6745 if len(found) else 0.0
 
 
 def between_samples(time: np.ndarray, values: np.ndarray) -> CubicSpline:
     """A measured force (n,) as a function of the time in s: what oscillates with few samples a period keeps its size.
 
-    A straight line between samples would take 4 % off what has nine of them a period.
+    A straight line between samples would take 4 % off what has nine of them a period. Raises ModelError where fewer
+    than two are valid.
     """
     valid = np.isfinite(values)
+    if np.count_nonzero(valid) < 2:
+        raise ModelError("a force that is applied to a body needs two valid samples at least")
     offset = values[valid & (time < 0.0)].mean() if (valid & (time < 0.0)).any() else 0.0
     return CubicSpline(time[valid], values[valid] - offset)

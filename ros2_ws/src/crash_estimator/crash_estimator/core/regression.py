@@ -144,7 +144,8 @@ class Regressor:
         known = self.share @ (forces.per_unit @ self.value + shift)
         measured = motion.measured
         if motion.applied is not None:
-            known, measured = known + np.nan_to_num(motion.applied), measured + 0.0 * motion.applied
+            lost = np.isnan(motion.applied)  # as where a measurement is
+            known, measured = known + np.where(lost, 0.0, motion.applied), np.where(lost, np.nan, measured)
         gradient = np.where(active, self.share @ forces.per_unit, 0.0)
         folds = np.abs(motion.rate) * motion.dt / np.maximum(np.abs(motion.crush), SHORTEST_CRUSH)
         walk = np.where(active & ~law.on_line[self.element], self.drift_squared * folds[self.element], 0.0)

@@ -16,6 +16,9 @@ AGREE = 1.25
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
 """Fourth difference: blind to a cubic, unit gain for white noise."""
 
+NORMAL_MEDIAN = 0.6745
+"""Of the magnitude of a normal variable, in standard deviations."""
+
 EFFICIENCY = 0.19
 """Share of its samples that the median of fourth differences of white noise is worth (simulated)."""
 
@@ -40,8 +43,7 @@ def sensor_noise(values: np.ndarray, time_ns: np.ndarray, rests: bool) -> Noise:
     if len(after) >= ENOUGH and rate < FAST and np.isnan(rest):
         busy = _highest_frequencies(after)
     elif len(after) >= ENOUGH and rate >= FAST:
-        # median: jumps of the force are rare, and must not count as noise
-        busy = float(np.median(np.abs(np.convolve(after, DIFFERENCE, "valid")))) / 0.6745
+        busy = by_differences(after)
     if np.isnan(rest) or busy > AGREE * rest:
         found, count = np.nan_to_num(busy), EFFICIENCY * len(after)
     elif np.isnan(busy) or busy < rest / AGREE:
@@ -60,3 +62,11 @@ def _highest_frequencies(values: np.ndarray) -> float:
     power = np.abs(np.fft.rfft((values - values.mean()) * np.hanning(len(values)))) ** 2
     highest = power[-(len(power) // 4) :]
     return float(np.sqrt(np.median(highest) / np.log(2.0) / np.sum(np.hanning(len(values)) ** 2)))
+
+
+def by_differences(values: np.ndarray) -> float:
+    """Standard deviation of white noise in values (n,), n >= 5, that else move slowly.
+
+    The median: jumps of the force are rare, and must not count as noise.
+    """
+    return float(np.median(np.abs(np.convolve(values, DIFFERENCE, "valid")))) / NORMAL_MEDIAN

@@ -11,7 +11,7 @@ STEP = 5e-4
 """s: the linear-acceleration step's phase error, (omega dt)^2 / 24, is 4e-4 for the stiffest contact, 200 rad/s."""
 
 MOST_STEPS = 160
-"""About: of a long record the bins are longer."""
+"""About: of a long record the bins are longer, or an update of the ranking would take more than its budget."""
 
 
 def in_bins(record: ObservedRecord) -> ObservedRecord:

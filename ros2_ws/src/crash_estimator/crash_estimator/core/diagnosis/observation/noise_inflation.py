@@ -24,7 +24,7 @@ BIN = 4e-3
 """s: means over it keep what is below 125 Hz; CFC 60 is 3 dB down at 100 Hz."""
 
 EDGES = (0.0, 30.0, 60.0, 125.0)
-"""Hz."""
+"""Hz: two halves of the band of `CFC`, and what its filter still passes above."""
 
 
 def with_inflated_noise(

@@ -11,10 +11,8 @@ from scipy.interpolate import CubicSpline
 
 from ... import compile_cache as _compile_cache  # noqa: F401  before any compiled function is defined
 
-RATE = 200.0
-"""1/s, of the first observer that a fit begins with (`continuation`): it holds a body within 5 ms ..."""
 OF_STEP = 0.2
-"""... unless the steps are long: of one over a step."""
+"""Of one over a step: fast, and slow enough that a step does not overshoot; only a start, which the fit corrects."""
 
 
 def tracked_acceleration(time: np.ndarray, displacement: CubicSpline, x0: float, v0: float) -> np.ndarray:
@@ -23,7 +21,7 @@ def tracked_acceleration(time: np.ndarray, displacement: CubicSpline, x0: float,
     x0, v0: m and m/s from which it will be integrated.
     """
     dt = np.diff(time, prepend=time[0])
-    rate = min(RATE, OF_STEP / float(dt.max()))
+    rate = OF_STEP / float(dt.max())
     return _track(dt, displacement(time), displacement(time, 1), displacement(time, 2), rate, x0, v0)
 
 

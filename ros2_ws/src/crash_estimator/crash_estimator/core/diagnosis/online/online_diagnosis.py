@@ -29,13 +29,13 @@ from ..report.ranking import ranking_of
 from ..report.verdict import ADEQUATE, EFFECT_MISSING, UNEXPLAINED
 from ..residuals.misfit_windows import misfit_windows
 from ..residuals.residuals import Residuals, analyse, noise_floor, rms
+from ..selection.assumptions import CELLS
 from ..selection.fitted_model import Model
 from ..selection.selection_step import SelectionStep
 from .candidate_turns import ITERATIONS_ON, MOST_ITERATIONS, OnlineState, try_some
 from .online_answer import Change, OnlineAnswer, curves
 from .warm_start import carried_on
 
-MOST_CELLS = 36
 CELLS_IN_ALL = 90
 """Of free curves over their crush scales: as fine as offline where elements are few."""
 
@@ -68,7 +68,7 @@ class OnlineDiagnosis:
         full = [observe(self.structure, recording), *self.other_records]
         records = [in_bins(record) for record in full]
         magnitudes = measure_magnitudes(
-            self.structure, records, min(MOST_CELLS, CELLS_IN_ALL // len(self.structure.elements))
+            self.structure, records, min(CELLS, CELLS_IN_ALL // len(self.structure.elements))
         )
         given = _model(state, records, magnitudes, additions_of(self.structure, magnitudes, self.effects))
         if given is None:

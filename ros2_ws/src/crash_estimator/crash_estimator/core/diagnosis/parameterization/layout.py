@@ -23,7 +23,8 @@ FREE, DRIVEN, FIXED = 0, 1, 2
 
 
 START_ERRS = 0.3
-"""Of the velocity's standard deviation: a derivative at the end of a channel has half of the samples to go by."""
+"""Of the velocity's standard deviation: wide, since a derivative at the end of a channel has half of the samples to go
+by, and the recording itself says soon enough how the body started. Not varied: any width beyond the error does."""
 
 
 class Layout(NamedTuple):

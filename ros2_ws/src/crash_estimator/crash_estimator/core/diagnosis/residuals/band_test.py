@@ -14,13 +14,14 @@ from scipy.fft import dct
 from scipy.special import fdtrc
 
 EDGES = (0.0, 60.0, 120.0, 240.0, 500.0, 1000.0, 2000.0, np.inf)
-"""Hz."""
+"""Hz: octaves, about, from the class of a structure's motion (SAE J211 CFC 60) on; the last one reaches as far as was
+sampled."""
 
 SIGNIFICANT = 0.001
 """Probability that white noise fails in any band of any channel: a wrong alarm once in a thousand tests; what a missing
 effect leaves is mostly far beyond it."""
 
-ABSORBING = (0.0, 60.0, 120.0, 240.0, 500.0)
+ABSORBING = EDGES[:5]
 """Hz: what is fitted moves slowly; above, a fit absorbs next to nothing."""
 
 LEAST_LEFT = 1.0

@@ -234,7 +234,7 @@ def _odds(addition: Addition, gain: float) -> float:
     Without a measured force nothing tells it from one beside the model's masses: halving every force and mass leaves
     the motion as it is.
     """
-    return gain - (THRESHOLDS.counted_in if addition.taken_from else 0.0)
+    return gain - (THRESHOLDS.gain if addition.taken_from else 0.0)
 
 
 def _bends_driven_motion(magnitudes: Magnitudes, addition: Addition) -> bool:

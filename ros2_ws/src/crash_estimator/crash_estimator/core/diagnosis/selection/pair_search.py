@@ -40,7 +40,7 @@ def _likely(candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
 def _one_after_the_other(magnitudes: Magnitudes, effects, model: Model, candidates) -> Iterator[Pair]:
     """The likeliest first ones, each with the best second one."""
     records = model.records
-    for first in _likely(candidates)[: THRESHOLDS.first_of_pair]:
+    for first in _likely(candidates)[: THRESHOLDS.with_care]:
         if analyse(first.fit).mean_square >= THRESHOLDS.real_structure:
             continue
         wider, larger = added(magnitudes, records, model, first)

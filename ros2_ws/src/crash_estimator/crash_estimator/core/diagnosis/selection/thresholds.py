@@ -12,7 +12,7 @@ class Thresholds(NamedTuple):
     # What counts, in nats of evidence
     gain: float = 6.0
     """From which a candidate counts as found: odds of 400 to 1 for some hundred candidates (Kass and Raftery 1995 call
-    5 very strong)."""
+    5 very strong). And what an unmodelled body whose mass the model's own contain must gain over one beside them."""
     gain_beyond_white: float = 20.0
     """For one more effect where those found leave white noise already: nothing but its evidence speaks for it."""
     gain_in_pair: float = 100.0
@@ -20,8 +20,6 @@ class Thresholds(NamedTuple):
     confounded: float = 10.0
     """Evidences closer than this do not tell two candidates apart. More than `gain`: Laplace's approximation and the
     priors of two different laws leave some nats open between them."""
-    counted_in: float = 6.0
-    """That an unmodelled body whose mass the model's own contain must gain over one beside them."""
     worth_fitting: float = 1.0
     """Of a screened gain."""
 
@@ -50,7 +48,7 @@ class Thresholds(NamedTuple):
     development cases outside the vocabulary to which an effect was added all had 0.48 and more; of 20 recordings of
     real structures, and of simulated ones that lack a law, 0.38 at most."""
 
-    # How much is tried
+    # How much is tried: whole numbers that bound the work. None of them was varied by itself; a larger one costs time
     most_steps: int = 4
     """Additions: what takes more is not told from a free curve that follows anything."""
     shortlist: int = 4
@@ -60,13 +58,11 @@ class Thresholds(NamedTuple):
     most_hosts: int = 3
     """Bodies that an unmodelled one is tried on, with a curve to each neighbour."""
     with_care: int = 3
-    """Candidates that are then fitted on by other schedules."""
+    """Candidates that are then fitted on by other schedules, and that are tried with a second one at once."""
     most_profiles: int = 4
     """Slopes on which an element may unload that are looked at over their value."""
     offset_starts: int = 2
     """Values of an offset that fits start from: those with which the forces along the measured motion fit best."""
-    first_of_pair: int = 3
-    """Candidates that are tried with a second one at once."""
     inflations: int = 3
     """Times that the noise is taken as large as what the best candidate leaves."""
     hopeless: float = 400.0
