@@ -25,10 +25,11 @@ check: lint # for every save: style, types, and the tests that need no ROS graph
 	@$(PYTEST) -n 2 --dist loadfile -q --no-graph $(CHECKED)
 
 # A file's tests are run by one of two processes; -n 0 in PYTEST_ARGS: all by one. What is compiled is so once, before.
+# A process that dies ends the run and names its test: pytest-xdist 3.8 waits for ever for one that it starts instead.
 test: lint # all tests, style and types first; some of them with PYTEST_ARGS="-k name"
 	@tools/screenshot-libs
 	@tools/env python -m crash_estimator.warm_up
-	@$(PYTEST) -n 2 --dist loadfile $(PYTEST_ARGS)
+	@$(PYTEST) -n 2 --dist loadfile --max-worker-restart 0 $(PYTEST_ARGS)
 
 bags: # the simulated recordings in bags/, made anew
 	@tools/run crash_replay synthesize --all --to bags
