@@ -25,11 +25,57 @@ def as_recorded(model, recording):
     return diagnose(model, [recording])
 
 
+def shifted(recording: Recording, ms: float) -> Recording:
+    """Its time zero is stated `ms` late."""
+    return Recording(recording.test, recording.time_ns - round(ms * 1e6), recording.values)
+
+
 @pytest.mark.parametrize("ms", [-1.0, 3.0])
 def test_with_the_onset_found_the_answer_is_that_of_the_unshifted_test(ms, model, recording, as_recorded):
-    late = Recording(recording.test, recording.time_ns - round(ms * 1e6), recording.values)
-    found = diagnose(model, [at_onset(late)])
+    found = diagnose(model, [at_onset(shifted(recording, ms))])
     assert found.verdict == as_recorded.verdict == "effect_missing"
     (step,), (expected,) = found.steps, as_recorded.steps
     assert (step.effect, step.target) == (expected.effect, expected.target)
     assert abs(step.coefficient - expected.coefficient) < expected.std, "the onset may be off by two samples"
+
+
+def test_a_time_zero_stated_late_is_named_before_what_the_model_lacks(model, recording, as_recorded):
+    found = diagnose(model, [shifted(recording, 3.0)])
+    zero, step = found.steps
+    assert (found.verdict, found.complete, zero.effect, zero.target) == (
+        "effect_missing", True, "time_zero", recording.test.id,
+    )  # fmt: skip
+    assert abs(zero.coefficient + 3e-3) < 2.5 * recording.sample_period
+    assert zero.residual_rms["after"] < zero.residual_rms["before"]
+    (expected,) = as_recorded.steps
+    assert (step.effect, step.target) == (expected.effect, expected.target)
+    assert abs(step.coefficient - expected.coefficient) < expected.std
+    assert found.ranking[0].effect == step.effect, "what can be added to the model"
+    assert found.effects_added == (step,) and len(found.models) == 3
+    assert [spec.type for spec in found.structure.effects] == [step.effect], "the model itself has no time zero"
+    assert "--time-zero auto" in found.text
+
+
+@pytest.fixture(scope="module")
+def padded():
+    return read_bag(BAGS / "side_dummy_padded.mcap")
+
+
+def test_a_right_model_of_a_test_with_a_wrong_time_zero_is_not_adequate(padded):
+    found = diagnose(load_model("side_dummy"), [shifted(padded, 5.0)])
+    (zero,) = found.steps
+    assert (found.verdict, found.complete, zero.effect) == ("effect_missing", True, "time_zero")
+    assert abs(zero.coefficient + 5e-3) < 2.5 * padded.sample_period
+    assert found.ranking[0].effect == "time_zero" and found.structure.effects == ()
+
+
+def test_a_time_zero_that_makes_no_difference_is_told_all_the_same(padded):
+    """Driven bodies move later: nothing happens before."""
+    found = diagnose(load_model("side_dummy"), [shifted(padded, -3.0)])
+    assert found.verdict == "adequate" and "the signals begin +3.1 ms (side_dummy_padded)" in found.text, found.text
+
+
+def test_several_recordings_are_moved_each_by_its_own(model, recording):
+    found = diagnose(model, [shifted(recording, 2.0), shifted(recording, 4.0)])
+    assert found.steps[0].effect == "time_zero" and found.steps[1].effect == "coulomb_friction"
+    assert abs(found.steps[0].coefficient + 4e-3) < 2.5 * recording.sample_period

@@ -8,6 +8,7 @@ from helpers_paths import BAGS, DATA
 from numpy.testing import assert_array_equal
 
 from crash_replay.bag import read_bag, write_bag
+from crash_replay.conditioning import filter_recording
 from crash_replay.import_command import main
 from crash_replay.onset import at_onset, find_onset, onset_note
 from crash_replay.readers import read_source
@@ -59,6 +60,15 @@ def test_of_measured_tests_the_same_instant_is_found_whatever_is_stated(name):
     assert abs(found.time_ns) <= 1_050_000
     for ms in SHIFTS_MS:
         assert abs(find_onset(shifted(recording, ms)).time_ns + round(ms * 1e6) - found.time_ns) <= 1
+
+
+@pytest.mark.parametrize("cfc", [60, 180])
+def test_a_car_that_shakes_on_its_way_to_the_barrier_has_not_reached_it(cfc):
+    """A filter leaves the shaking slow and large beside the first 10 ms; and it smears the impact by some ms."""
+    if not (DATA / "nhtsa-10146").exists():
+        pytest.skip(f"{DATA / 'nhtsa-10146'} is not there")
+    found = find_onset(filter_recording(read_source(DATA / "nhtsa-10146"), cfc))
+    assert -3_000_000 < found.time_ns < 1_050_000 and {"car_ax", "barrier_fx"} & set(found.channels)
 
 
 def test_import_finds_it_and_says_so(tmp_path, capsys):

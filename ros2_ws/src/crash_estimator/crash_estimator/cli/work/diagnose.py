@@ -50,7 +50,7 @@ def apply(found: Diagnosis, had: tuple[EffectSpec, ...], effects: dict[str, Effe
     added = found.structure.effects[len(had) :]
     if added:
         content.setdefault("effects", [])
-    for spec, step in zip(added, found.steps, strict=False):
+    for spec, step in zip(added, found.effects_added, strict=True):
         entry = _entry(spec, effects[spec.type], list(content["bodies"]))
         if "coefficient" in entry:
             replaces = effects[spec.type].replaces

@@ -11,7 +11,7 @@ from ...effects import EFFECTS
 from ...effects.effect import Effect
 from ...structure import ModelError, Structure
 from ..observation.pace import at_its_own_pace
-from ..observation.record import observe
+from ..observation.record import ObservedRecord, observe
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import free_run, noise_floor
 from ..residuals.score_test import Drift, drift_of
@@ -20,9 +20,11 @@ from ..selection.fitted_model import Model
 from ..selection.selection_step import fit_of_all
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_limit import out_of_time, time_limit
+from ..selection.time_zero import Shift, TimeZero, from_their_onset, time_zero_wrong
 from .left import Left, band_of, left_by
 from .model_effects import structure_with
 from .ranking import Ranked, StepReport, ranking_of, step_of
+from .time_zero_step import TIME_ZERO, as_ranked, signals_begin, time_zero_step
 from .tolerance import DEFAULT, Tolerance
 from .verdict import Evidence, verdict_on
 from .verdict_text import verdict_text
@@ -60,6 +62,11 @@ class Diagnosis:
     models: tuple[Model, ...]  # as given, then after each step
     stopped: bool = False  # the time was up before everything was tried
 
+    @property
+    def effects_added(self) -> tuple[StepReport, ...]:
+        """The steps that the structure has: a time zero is the recordings' own."""
+        return tuple(step for step in self.steps if step.effect != TIME_ZERO)
+
     def as_json(self) -> dict:
         return {
             "verdict": self.verdict,
@@ -94,20 +101,43 @@ def diagnose(
         raise ModelError("a diagnosis needs at least one recording")
     structure, recordings = with_accelerations(structure, recordings)
     with time_limit(seconds):
-        records = [observe(structure, at_its_own_pace(structure, recording)) for recording in recordings]
+        records, zero, unused = _observed(structure, recordings, effects)
         path = first_believed(select(structure, records, effects), records)
         stopped = out_of_time()
-    found = _answer(structure, path, drift_of(path.as_recorded), tolerance)
+    found = _answer(structure, path, drift_of(path.as_recorded), tolerance, zero)
+    if unused:
+        found = replace(found, text=f"{found.text}; {signals_begin(unused)}, which would explain nothing here")
     if not stopped:
         return found
     return replace(found, stopped=True, text=f"{found.text}; stopped after {seconds:g} s: not everything was tried")
 
 
-def _answer(structure: Structure, path: SelectionPath, drift: Drift, tolerance: Tolerance) -> Diagnosis:
-    first, band = path.steps[0].before, band_of(path.final)
-    before = left_by(first, band)
+def _observed(
+    structure: Structure, recordings: Sequence[Recording], effects: Mapping[str, Effect]
+) -> tuple[list[ObservedRecord], TimeZero | None, tuple[Shift, ...]]:
+    """The recordings from the time zero on that the model leaves least of: the stated one, or their onset; and onsets
+    elsewhere that make no difference to it."""
+
+    def observed(recordings: Sequence[Recording]) -> list[ObservedRecord]:
+        return [observe(structure, at_its_own_pace(structure, recording)) for recording in recordings]
+
+    records = observed(recordings)
+    moved, shifts = from_their_onset(recordings)
+    if not shifts:
+        return records, None, ()
+    from_onset = observed(moved)
+    zero = time_zero_wrong(structure, records, from_onset, shifts, effects)
+    return (from_onset, zero, ()) if zero else (records, None, shifts)
+
+
+def _answer(
+    structure: Structure, path: SelectionPath, drift: Drift, tolerance: Tolerance, zero: TimeZero | None
+) -> Diagnosis:
+    band = band_of(path.final)
+    given = zero.as_stated if zero else path.steps[0].before
+    before = left_by(given, band)
     if tolerance.stated and tolerance.admits(before):  # whoever says so wants nothing added
-        path = path._replace(steps=path.steps[:1], final=first)
+        path, zero = path._replace(steps=path.steps[:1], final=path.steps[0].before), None
     steps, final, present = path.steps, path.final, path.present
     models = tuple(step.before for step in steps)
     if models[-1] is not final:
@@ -116,13 +146,19 @@ def _answer(structure: Structure, path: SelectionPath, drift: Drift, tolerance: 
     runs = [free_run(model.fit).rms for model in models]
     pairs = zip(steps, models, models[1:], zip(runs, runs[1:], strict=False), strict=False)  # the last has no successor
     of_all = fit_of_all(steps[: len(added)], final)
-    reports = tuple(step_of(*each, of_all) for each in list(pairs)[: len(added)])
+    reports = effects_added = tuple(step_of(*each, of_all) for each in list(pairs)[: len(added)])
     ranking, after = ranking_of(steps[0]), left_by(final, band)
+    if zero:
+        runs = [free_run(given.fit).rms, *runs]
+        moved = time_zero_step(zero, models[0], (runs[0], runs[1]))
+        models, reports = (given, *models), (moved, *effects_added)
+        ranking = ranking if added else (as_ranked(moved), *ranking)
     weighed = final.fit.problem.noise_is_inflated or after.share_explained(before) > THRESHOLDS.all_but_folds
     certain = all(abs(one.coefficient) > one.std for one in reports)
-    evidence = Evidence(len(added), final.white, drift, before, after, ranking, weighed, certain)
+    many = len(added) or len(reports)  # a time zero is none of the effects that may be too many
+    evidence = Evidence(many, final.white, drift, before, after, ranking, weighed, certain)
     verdict = verdict_on(evidence, tolerance)
-    floor = noise_floor(first.fit.layout, first.records)
+    floor = noise_floor(given.fit.layout, given.records)
     return Diagnosis(
         verdict=verdict.word,
         complete=verdict.complete,
@@ -130,14 +166,14 @@ def _answer(structure: Structure, path: SelectionPath, drift: Drift, tolerance: 
         left_before=before,
         noise=evidence.noise,
         tolerance=tolerance,
-        text=verdict_text(verdict, evidence, tolerance, reports, first, final, floor, path.structure is structure),
-        residual_rms=Rms(first.residuals.rms, final.residuals.rms, floor),
+        text=verdict_text(verdict, evidence, tolerance, reports, given, final, floor, path.structure is structure),
+        residual_rms=Rms(given.residuals.rms, final.residuals.rms, floor),
         free_run_rms=Rms(runs[0], runs[-1]),
         ranking=ranking,
         steps=reports,
         remaining=ranking_of(steps[-1]),
-        misfit=misfit_windows(first.fit.layout, first.records, first.residuals),
+        misfit=misfit_windows(given.fit.layout, given.records, given.residuals),
         misfit_after=misfit_windows(final.fit.layout, final.records, final.residuals),
-        structure=structure_with(path.structure, added, reports),
+        structure=structure_with(path.structure, added, effects_added),
         models=models,
     )

@@ -8,6 +8,7 @@ from ..selection.fitted_model import Model
 from ..selection.thresholds import THRESHOLDS
 from .left import Left
 from .ranking import StepReport
+from .time_zero_step import TIME_ZERO, shifts_of, signals_begin
 from .tolerance import Tolerance
 from .verdict import ADEQUATE, EFFECT_MISSING, Evidence, Verdict
 
@@ -24,7 +25,10 @@ def verdict_text(
         said = f"effect missing: {_missing(evidence, tolerance, steps, first, final, floor)}"
     else:
         said = f"unexplained: {_unexplained(evidence, steps, first, final, floor)}"
-    return said if as_given else f"{said}; with contacts that never pull, not even by their dampers"
+    said = said if as_given else f"{said}; with contacts that never pull, not even by their dampers"
+    if steps and steps[0].effect == TIME_ZERO:
+        said += f"; {signals_begin(shifts_of(steps[0]))}: `import --time-zero auto` moves it"
+    return said
 
 
 def _adequate(evidence: Evidence, tolerance: Tolerance, final: Model, floor: float) -> str:

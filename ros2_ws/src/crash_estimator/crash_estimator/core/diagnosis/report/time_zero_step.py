@@ -1,0 +1,54 @@
+"""A time zero that was stated wrongly, told as the first of the steps."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..residuals.residuals import noise_floor
+from ..selection.fitted_model import Model
+from ..selection.time_zero import Shift, TimeZero
+from .ranking import Ranked, StepReport
+
+TIME_ZERO = "time_zero"
+"""As the steps name it: no effect of a model but an error of a recording, mended by `import --time-zero auto`."""
+
+
+def time_zero_step(zero: TimeZero, moved: Model, free_run_rms: tuple[float, float]) -> StepReport:
+    """The coefficient is the onset's time since the stated zero, s; of several recordings the farthest's, all of them
+    beside it.
+
+    moved: the model as given, fitted from the onset on; free_run_rms: of both models' free runs.
+    """
+    farthest = max(zero.shifts, key=lambda shift: abs(shift.seconds))
+    stated, found = zero.as_stated.residuals.rms, moved.residuals.rms
+    floor = noise_floor(moved.fit.layout, moved.records)
+    return StepReport(
+        TIME_ZERO,
+        ", ".join(shift.test for shift in zero.shifts),
+        farthest.seconds,
+        farthest.std,
+        "s",
+        zero.gain(moved),
+        explained=float(np.clip(1.0 - (found / stated) ** 2, 0.0, 1.0)),
+        shape={shift.test: shift.seconds for shift in zero.shifts} if len(zero.shifts) > 1 else {},
+        residual_rms={"before": stated, "after": found, "noise_floor": floor, "unit": "m/s^2"},
+        free_run_rms={"before": free_run_rms[0], "after": free_run_rms[1]},
+        force_explained={},
+    )
+
+
+def as_ranked(step: StepReport) -> Ranked:
+    """For where nothing else is missing."""
+    told = step.std <= abs(step.coefficient)
+    numbers = step.coefficient, step.std, step.unit, step.evidence, step.explained
+    return Ranked(step.effect, step.target, *numbers, told, (), step.shape)
+
+
+def shifts_of(step: StepReport) -> list[Shift]:
+    each = step.shape or {step.target: step.coefficient}
+    return [Shift(test, seconds, step.std) for test, seconds in each.items()]
+
+
+def signals_begin(shifts: Sequence[Shift]) -> str:
+    each = ", ".join(f"{1e3 * shift.seconds:+.3g} ms ({shift.test})" for shift in shifts)
+    return f"the signals begin {each} from the stated time zero"
