@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_replay.readers import read_source
-from crash_replay.readers.isomme_codes import channel_of
+from crash_replay.readers.codes.isomme import channel_of
 from crash_replay.recording import RecordingError
 
 MME = """\
@@ -94,6 +94,11 @@ def test_folder(tmp_path, encoding):
         ("14BPILLEUP00ACYD", "second_left_b_pillar_left_upper_ay_cfc60", "second_left_b_pillar_left_upper"),
         ("M0VEHC000000ACXP", "mdb_car_ax", "mdb_car"),
         ("11HEAD0000H3AVZ0", "front_left_head_wz", "front_left_head"),
+        ("17SEBE0000B3FO0P", "third_left_seat_belt_upper_diagonal_f", "third_left_seat_belt_upper_diagonal"),
+        ("10FORALERERDAC1P", "floor_over_rear_axle_left_rear_ax", "car"),
+        ("15PELV00LLQ6MOXF", "second_middle_pelvis_left_lower_mx_cfc600", "second_middle_pelvis_left_lower"),
+        ("1AKNSLLE00THDSXC", "seat_a_knee_slider_left_dx_cfc180", "seat_a_knee_slider_left"),
+        ("10VEHCCG0000VAXD", "car_vx_cfc60", "car"),
         ("11TRRILE01WSDSYP", "front_left_rib_left_01_dy", "front_left_rib_left_01"),
     ],
 )
@@ -101,6 +106,13 @@ def test_names(code, name, body):
     channel = channel_of(code, "", several_objects=False)
     assert (channel.name, channel.body) == (name, body)
     assert channel_of("20HEADCG00H3ACXP", "", several_objects=True).name == "object2_head_ax"
+
+
+def test_a_direction_with_another_sign_is_said(tmp_path):
+    """NHTSA's exports have 1 for the longitudinal direction."""
+    recording = read_source(write_folder(tmp_path, [FILES[0].replace("ACX", "AC1")]))
+    assert recording.test.channels[0].axis == "x"
+    assert any(note.startswith("direction 1, 2 or 3") and "--names" in note for note in recording.test.notes)
 
 
 def test_a_velocity_with_its_unit_and_doubled_names(tmp_path):

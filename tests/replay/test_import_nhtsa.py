@@ -146,6 +146,10 @@ def curve(comment, sensor="AC", occupant="NA", location="XXXX", axis="XG", unit=
         (curve("BOTTOM OF ENGINE X: No valid data after 67ms"), "engine_bottom_ax"),
         (curve("", location="VECG", axis="NA"), "cg_a"),
         (curve("3RD ROW X"), "xxxx_3rd_row_ax"),
+        (curve("ACCEL. LOCATION #1, NO COMMENTS", location="DSRF", axis="YG"), "right_front_sill_ay"),
+        (curve("NO COMMENTS", location="RBLU", occupant="04", axis="YL"), "rear_left_passenger_left_upper_rib_ay"),
+        (curve("NO COMMENTS", "LC", "03", "LUMB", "ZL", "LBS"), "rear_right_passenger_lumbar_spine_fz"),
+        (curve("NO COMMENTS", "LC", location="LCA0", unit="NWT", vehicle=0), "barrier_load_cell_a10_fx"),
     ],
 )
 def test_names(given, name):
@@ -221,6 +225,22 @@ def test_small_folder_with_every_trap(tmp_path):
         "left out, no data file: curves 8, 25",
         "left out, sampled at another rate than 10000 Hz: curves 9",
     )
+
+
+def test_comment_lines_blank_numbers_and_statuses(tmp_path):
+    """As NHTSA's guide allows them: # anywhere, a field that is not determined left blank, MN for meaningless."""
+    folder = write_folder(tmp_path, [*SENSORS[:3], record(30, "SILL X", [0, 0, 9, 9, 9], status="MN"),
+                                     record(31, "ROOF X", [0, 0, 1, 1, 1], status="QD")])  # fmt: skip
+    header = folder / "v99.EV5"
+    text = header.read_text().replace("|OTH|OTH|36.0|", "|OTH|OTH| |").replace("|AF|1500|", "|AF| |")
+    lines = ["# by hand" if line.startswith("----- INST") else "" for line in text.splitlines()]
+    text = "\n".join(line + (f"\n{comment}" if comment else "") for line, comment in zip(text.splitlines(), lines))
+    header.write_text(text.replace("|36|-2|", "||-2|"))
+    recording = read_source(folder)
+    notes = "\n".join(recording.test.notes)
+    assert recording.test.initial_velocity == {}
+    assert "no valid data, says the header: curves 30" in notes and "questionable, says the header: roof_ax" in notes
+    assert {"driver_head_ax", "car_ax", "roof_ax"} <= set(recording.test.channel_names)
 
 
 def test_cells_that_read_positive_stay_positive(tmp_path):

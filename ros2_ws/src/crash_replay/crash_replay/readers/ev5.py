@@ -3,6 +3,7 @@
 The fields follow NHTSA's test reference guide, version 5.
 """
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -27,11 +28,11 @@ class Curve(NamedTuple):
     calibration: str
     full_scale: str
     full_scale_used: str  # %
-    initial_velocity: float  # km/h along the axis
+    initial_velocity: float  # km/h along the axis; NaN where it is not stated
     first: int  # index of the first sample; time zero is index 0
     last: int
     step: float  # us
-    status: str  # AM as measured, CM computed, CF failed, NO none
+    status: str  # AM as measured, CM computed, CF failed, MN meaningless, SF system failed, QD questionable, NO none
     redundancy: str  # P primary, R redundant
     comment: str
 
@@ -83,7 +84,7 @@ def read_header(path: Path) -> Header:
     for number, line in enumerate(lines, start=1):
         if line.startswith("-----"):
             name = line.strip("- \r")
-        elif name and line.strip():
+        elif name and line.strip() and not line.startswith("#"):  # a comment may stand anywhere
             sections.setdefault(name, []).append((number, line.rstrip("\r").split("|")))
     for wanted in ("TEST", "INSTRUMENTATION"):
         if not sections.get(wanted):
@@ -99,11 +100,11 @@ def read_header(path: Path) -> Header:
         date=test[3],
         laboratory=test[4],
         configuration=test[8],
-        closing_speed=_number(path, line, "closing speed", test[14], SPEED),
+        closing_speed=_number(path, line, "closing speed", test[14].strip() or "0", SPEED),
         impact_angle=_angle(test[15]),
         masses={
             int(_number(path, n, "vehicle", f[0], NUMERIC["vehicle"][1])): _number(
-                path, n, "test mass", f[10], TEST_MASS
+                path, n, "test mass", f[10].strip() or "0", TEST_MASS
             )
             for n, f in sections.get("VEHICLE", [])
             if len(f) > 10
@@ -126,7 +127,9 @@ def _curve(path: Path, line: int, fields: Sequence[str]) -> Curve:
         )
     given = dict(zip(Curve._fields, (field.strip() for field in fields), strict=False))
     for name, (kind, limit) in NUMERIC.items():
-        given[name] = kind(_number(path, line, name, given[name], limit))
+        # what is not determined is left blank: a velocity then is none, a count is an error
+        text = "nan" if name == "initial_velocity" and not given[name] else given[name]
+        given[name] = math.nan if text == "nan" else kind(_number(path, line, name, text, limit))
     return Curve(**given)
 
 

@@ -20,8 +20,8 @@ from ..recording import Channel, Recording, RecordingError, Test
 from ..shortened import shortened
 from ..unique_names import unique
 from .body_means import Sensor, body_motion
+from .codes.isomme import channel_of, is_time, other_sign
 from .dates import stamp_of
-from .isomme_codes import channel_of, is_time
 from .units import si_factor
 
 NO_VALUE = "NOVALUE"
@@ -103,6 +103,11 @@ def read(path: Path, all_sensors: bool = False) -> Recording:
         raise RecordingError(f"{path}: no channel can be used: {'; '.join(notes)}")
     tracks, time_ns, values = _common_time(path, tracks, notes)
     channels = unique([track.channel for track in tracks])
+    if turned := [channel.name for track, channel in zip(tracks, channels) if other_sign(track.code)]:
+        notes.append(
+            f"direction 1, 2 or 3 in the code: the sign is not that of SAE J211: turn what looks wrong with --names "
+            f"(sign: -1): {shortened(turned)}"
+        )
     if any(_on_barrier(track.code, channel) for track, channel in zip(tracks, channels)):
         notes.append("barrier forces keep their recorded sign; a model expects compression to be positive")
     made, outliers = _made_of_several(header, tracks, channels, time_ns, values, notes)
