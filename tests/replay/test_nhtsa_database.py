@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from helpers_ev5 import two_cars, write_two_cars
 from helpers_nhtsa_server import Database, client_of, packed, served
+from helpers_uds import CODES, write_uds
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_replay import limits
@@ -97,7 +98,7 @@ def test_without_a_package_that_can_be_used_it_comes_curve_by_curve(
     if fault == "missing":
         database.faults = {"/files/": [404]}
     elif fault == "none named":
-        database.documents = lambda url: [{"evFiles": None, "udsFiles": [f"{url}/files/uds.zip"]}]
+        database.documents = lambda url: [{"evFiles": None, "tdmsFiles": [f"{url}/files/tdms.zip"]}]
     elif fault == "truncated":
         database.package = whole[: len(whole) // 2]
     elif fault == "rotten":
@@ -153,6 +154,15 @@ def test_rows_of_url_and_document_type(database, expected):
         {"url": f"{url}/files/v07292ev5.zip", "documentType": "EV5 data"},
     ]
     same(fetched(database), expected)
+
+
+def test_a_package_of_uds_files_where_there_is_none_in_ev5_form(database, expected, tmp_path):
+    records = [("|".join(CODES.get(part, part) for part in record.split("|")), values) for record, values in two_cars()]
+    database.package = packed(write_uds(tmp_path / "uds", [*records[:3], records[9]]))
+    database.documents = lambda url: [{"evFiles": None, "udsFiles": [f"{url}/files/uds.zip"], "tdmsFiles": ["t.zip"]}]
+    recording = fetched(database)
+    for name in ("vehicle1_driver_head_ax", "vehicle1_driver_chest_ax"):
+        assert_allclose(recording.column(name), expected.column(name), rtol=1e-4, atol=1e-3)
 
 
 def test_paths_in_a_package_lead_nowhere_else(database, expected, folder, tmp_path):
