@@ -243,6 +243,56 @@ def test_comment_lines_blank_numbers_and_statuses(tmp_path):
     assert {"driver_head_ax", "car_ax", "roof_ax"} <= set(recording.test.channel_names)
 
 
+@pytest.mark.parametrize(
+    "wrong, message",
+    [
+        (lambda text: text.replace("|DRIVER HEAD X", ""), "expected 20 fields in an INSTRUMENTATION record, found 19"),
+        (lambda text: text.replace("|100|AM|P|DRIVER", "|x|AM|P|DRIVER"), "step: expected a number, found 'x'"),
+        (lambda text: text.replace("|-2|2|100|AM|P|DRIVER", "||2|100|AM|P|DRIVER"), "first: expected a number"),
+    ],
+)
+def test_a_record_at_fault_costs_only_itself(tmp_path, wrong, message):
+    file = write_folder(tmp_path) / "v99.EV5"
+    text = file.read_text()
+    assert wrong(text) != text
+    file.write_text(wrong(text))
+    recording = read_source(tmp_path)
+    assert "driver_head_ax" not in recording.test.channel_names and "car_ax" in recording.test.channel_names
+    assert any(n.startswith(f"left out, {message}") and n.endswith("line 8 of v99.EV5") for n in recording.test.notes)
+
+
+def test_the_separator_in_a_commentary(tmp_path):
+    file = write_folder(tmp_path) / "v99.EV5"
+    file.write_text(file.read_text().replace("|DRIVER HEAD X", "|DRIVER HEAD X|NO COMMENTS|"))
+    assert "driver_head_ax" in read_source(tmp_path).test.channel_names
+
+
+def test_values_alone_as_laboratories_submit_them(tmp_path):
+    """NHTSA's guide: one value a line in any floating-point format, the time from the header; in the folder DATA."""
+    expected = read_source(write_folder(tmp_path))
+    (tmp_path / "DATA").mkdir()
+    for file in tmp_path.glob("v99.*"):
+        target = file.rename(tmp_path / "DATA" / file.name)
+        if file.suffix != ".EV5":
+            values = [float(line.split("\t")[1]) for line in target.read_text().splitlines()]
+            target.write_text("".join(f"{x:+.5E}\n".replace("E", "D") for x in values))
+    recording = read_source(tmp_path)
+    assert recording.test.channel_names == expected.test.channel_names
+    assert_array_equal(recording.time_ns, expected.time_ns)
+    assert_allclose(recording.values, expected.values, rtol=1e-5)
+    assert "v99.024: 3 values, 5 in the header, and no times beside them: curves 24" in "\n".join(recording.test.notes)
+
+
+def test_vehicles_are_those_of_the_sensors_too(tmp_path):
+    """Where the header does not list them, two cars are not one."""
+    file = (
+        write_folder(tmp_path, [*SENSORS[:3], record(40, "FLOOR LEFT X", [0, 0, 9, 9, 9], location="FLLR", vehicle=2)])
+        / "v99.EV5"
+    )
+    file.write_text(file.read_text().replace("----- VEHICLE -----\n1|16|03|2018|M|4S|V|4CIF|2.5|AF|1500|1\n", ""))
+    assert {"vehicle1_car_ax", "vehicle2_car_ax"} <= set(read_source(tmp_path).test.channel_names)
+
+
 def test_cells_that_read_positive_stay_positive(tmp_path):
     cells = [record(20, "BARRIER A-01 Fx", [0, 0, 10, 20, -5], "LC", unit="NWT", vehicle=0)]
     recording = read_source(write_folder(tmp_path, cells))
@@ -259,7 +309,7 @@ def test_a_damaged_curve_costs_only_itself(tmp_path):
     assert recording.test.channel_names == ("barrier_fx", "engine_top_ax")
     notes = "\n".join(recording.test.notes)
     assert "left out, v99.001 is damaged (" in notes
-    assert "left out, v99.002: expected the two columns time and value: curves 2" in notes
+    assert "left out, v99.002: expected the two columns time and value, or values alone: curves 2" in notes
     assert "left out, v99.003: its times are not the header's steps of 100 us: curves 3" in notes
 
 
@@ -284,12 +334,8 @@ def test_names_file_in_the_folder_renames(tmp_path):
             "v99.EV5:4: closing speed: expected a number, found 'fast'",
         ),
         (
-            lambda text: text.replace("|DRIVER HEAD X", ""),
-            "v99.EV5:8: expected 20 fields in an INSTRUMENTATION record, found 19",
-        ),
-        (
-            lambda text: text.replace("|100|AM|P|DRIVER", "|x|AM|P|DRIVER"),
-            "v99.EV5:8: step: expected a number, found 'x'",
+            lambda text: text.replace("|AM|P|", "|").replace("|CF|P|", "|").replace("|NO|P|", "|"),
+            "v99.EV5: none of 15 INSTRUMENTATION records can be read: expected 20 fields in an INSTRUMENTATION record",
         ),
         (lambda text: text.replace("V5|A CAR", "V5"), "v99.EV5:4: expected 20 fields in a TEST record, found 19"),
     ],

@@ -80,6 +80,7 @@ def recording_of(
         *of_barrier,
         *_short(columns, start, step),
         *_summary(left_out),
+        *(summary(why, [], where) for why, where in header.wrong),
     ]
     if not columns:
         raise RecordingError(f"{path}: no curve but of the barrier's cells, and their sum cannot be made")
@@ -99,7 +100,12 @@ def recording_of(
 
 
 def _headers(folder: Path) -> list[Path]:
-    return sorted(entry for entry in folder.iterdir() if entry.suffix.upper() == ".EV5")
+    """In the folder or, as a test is submitted, in its folder DATA."""
+    inner = [entry for entry in folder.iterdir() if entry.name.upper() == "DATA" and entry.is_dir()]
+    for place in (folder, *inner):
+        if found := sorted(entry for entry in place.iterdir() if entry.suffix.upper() == ".EV5"):
+            return found
+    return []
 
 
 def _body_motion(
@@ -121,7 +127,7 @@ def _body_motion(
                 near = location_of(track.curve.location, track.curve.comment).near
                 sensors.append(Sensor(track.channel, track.on(start, end), near))
                 numbers[track.channel] = f"curve {track.curve.number}"
-    vehicles = len(header.masses)
+    vehicles = header.vehicles
     cars = {f"vehicle{k}_car" if vehicles > 1 else "car": mass for k, mass in header.masses.items() if mass > 0}
     if vehicles > 1 and not header.along_one_line:
         cars = {}
@@ -182,7 +188,7 @@ def _questionable(tracks: Sequence[Track]) -> list[str]:
 
 
 def _about(header: Header) -> list[str]:
-    masses = ", ".join(f"{mass:g} kg" for mass in header.masses.values())
+    masses = ", ".join(f"{mass:g} kg" for mass in header.masses.values() if mass > 0)
     return [f"closing speed {header.closing_speed:g} km/h" + (f", test mass {masses}" if masses else "")]
 
 

@@ -53,7 +53,7 @@ def read_tracks(header: Header, samples_of: Callable[[int], tuple[str, np.ndarra
     samples_of: of the header's k-th curve its file's name and (n, 2) time in s and value; raises Unusable.
     """
     tracks, left_out = [], []
-    vehicles = len(header.masses)
+    vehicles = header.vehicles
     named = list(zip(header.curves, channel_names(header.curves, vehicles)))
     for k, (curve, name) in enumerate(with_progress(named, "reading curve")):
         try:
@@ -64,13 +64,22 @@ def read_tracks(header: Header, samples_of: Callable[[int], tuple[str, np.ndarra
 
 
 def ev5_samples(header_file: Path, header: Header) -> Callable[[int], tuple[str, np.ndarray]]:
-    """Of a folder with a file for each curve beside the header."""
+    """Of a folder with a file for each curve beside the header: values alone, as laboratories submit them, or beside
+    their time, as the database gives them out."""
 
     def samples_of(k: int) -> tuple[str, np.ndarray]:
-        file = header_file.with_name(f"{header_file.stem}.{header.curves[k].number:03d}")
+        curve = header.curves[k]
+        file = header_file.with_name(f"{header_file.stem}.{curve.number:03d}")
         if not file.is_file():
             raise Unusable("no data file")
-        return file.name, _table(file)
+        table = _table(file)
+        if table.shape[1] == 1:
+            stated = curve.last - curve.first + 1
+            if len(table) != stated:
+                raise Unusable(f"{file.name}: {len(table)} values, {stated} in the header, and no times beside them")
+            times = (curve.first + np.arange(stated)) * (curve.step * 1e-6)
+            table = np.column_stack([times, table])
+        return file.name, table
 
     return samples_of
 
@@ -102,14 +111,14 @@ def _read_track(curve: Curve, name: str, body: str, samples: Callable[[], tuple[
 
 
 def _table(file: Path) -> np.ndarray:
-    """(n, 2) time in s and value. Raises Unusable."""
+    """(n, 2) time in s and value, or (n, 1) the values alone. Raises Unusable."""
     try:
         if wrong := limits.file_wrong(file, limits.CURVE_FILE):
             raise Unusable(f"{file.name} {wrong}")
-        lines = file.read_text(encoding="latin-1").splitlines()
+        lines = file.read_text(encoding="latin-1").upper().replace("D", "E").splitlines()  # Fortran's 0.5D-01
         table = np.loadtxt(lines, ndmin=2) if any(line.strip() for line in lines) else np.empty((0, 2))
     except (ValueError, OSError) as error:
         raise Unusable(f"{file.name} is damaged ({limits.shown(str(error))})") from None
-    if table.shape[1:] != (2,) or not len(table):
-        raise Unusable(f"{file.name}: expected the two columns time and value")
+    if table.shape[1:] not in ((1,), (2,)) or not len(table):
+        raise Unusable(f"{file.name}: expected the two columns time and value, or values alone")
     return table
