@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..recording import Recording, RecordingError
+from ..shortened import shortened
 from .codes.nhtsa import code_of_attachment, code_of_status
 from .ev5 import Curve, Header
 from .left_out import MARK
@@ -48,7 +49,7 @@ def read(path: Path, cells: bool = False, all_sensors: bool = False) -> Recordin
         except (RecordingError, OSError) as error:
             wrong.append(f"{MARK}{file.name}: {str(error).removeprefix(f'{file}:').strip()}")
     if not read_curves:
-        raise RecordingError(f"{path}: no UDS file can be used: {'; '.join(wrong)}")
+        raise RecordingError(f"{path}: no UDS file can be used: {shortened(wrong)}")
     tests = {curve.test["TSTNO"] for _, curve in read_curves}
     if len(tests) > 1:
         raise RecordingError(f"{path}: expected the curves of one test, found {', '.join(map(str, sorted(tests)))}")
@@ -66,7 +67,7 @@ def read(path: Path, cells: bool = False, all_sensors: bool = False) -> Recordin
     tracks, left_out = read_tracks(header, samples_of)
     if not tracks:
         reasons = dict.fromkeys([*(why for _, why in left_out), *wrong])
-        raise RecordingError(f"{path}: none of the {len(read_curves)} curves can be used: {'; '.join(reasons)}")
+        raise RecordingError(f"{path}: none of the {len(read_curves)} curves can be used: {shortened(list(reasons))}")
     recording = recording_of(path, header, tracks, left_out, cells, all_sensors)
     return replace(recording, test=replace(recording.test, notes=(*recording.test.notes, *wrong)))
 

@@ -16,7 +16,17 @@ KMH = 1.0 / 3.6
 """m/s"""
 
 FACTORS: Mapping[str, Mapping[str, float]] = {
-    "acceleration": {"m/s^2": 1.0, "m/s2": 1.0, "m/(s*s)": 1.0, "mm/s^2": 1e-3, "mm/ms^2": 1e3, "g": G, "G'S": G},
+    "acceleration": {
+        "m/s^2": 1.0,
+        "m/s2": 1.0,
+        "m/(s*s)": 1.0,
+        "m/s**2": 1.0,
+        "m/s\N{SUPERSCRIPT TWO}": 1.0,
+        "mm/s^2": 1e-3,
+        "mm/ms^2": 1e3,
+        "g": G,
+        "G'S": G,
+    },
     "velocity": {
         "m/s": 1.0,
         "mm/s": 1e-3,

@@ -33,9 +33,17 @@ MOVES_WITH = dict.fromkeys(
 """Locations that move with a body that has several: the passenger cell, the engine."""
 
 
+OF_A_BARRIER = ("LOMA", "FBAR", "WALL")
+
+
 def is_time(code: str) -> bool:
     """A time base: read with the channels that refer to it."""
     return code[12:14] == "TI"
+
+
+def object_of(code: str) -> str:
+    """The test object's letter; NHTSA's exports have 0 for the barrier, whose sensors the main location tells."""
+    return "B" if code[:1] == "0" and code[2:6] in OF_A_BARRIER else code[:1]
 
 
 def channel_of(code: str, source: str, several_objects: bool) -> Channel:
@@ -45,14 +53,15 @@ def channel_of(code: str, source: str, several_objects: bool) -> Channel:
     if code[12:14] not in DIMENSIONS:
         raise RecordingError(f"dimension {code[12:14]} has no ROS message")
     quantity, letter = DIMENSIONS[code[12:14]]
-    of_object = TEST_OBJECTS.get(code[0], f"object{code[0]}" if several_objects else "")
+    test_object = object_of(code)
+    of_object = TEST_OBJECTS.get(test_object, f"object{test_object}" if several_objects else "")
     owner = [of_object, POSITIONS.get(code[1], "")]
     main = NAMED.get(code[2:6]) or MAIN_LOCATIONS.get(code[2:6], code[2:6].replace("?", "").lower())
     fine = [FINE_LOCATIONS.get(part, part.replace("?", "").lower()) for part in (code[6:8], code[8:10])]
     place = [*owner, main, *fine, BELT_PLACES.get(code[10:12], "")]
     axis = OTHER_SIGN.get(code[14], code[14].lower() if code[14] in "XYZ" else "")
     moves_with = [of_object, MOVES_WITH[code[2:6]]] if code[2:6] in MOVES_WITH else place
-    moves_with = ["barrier"] if code[0] == "B" else moves_with
+    moves_with = ["barrier"] if test_object == "B" else moves_with
     cfc = f"cfc{FILTER_CLASSES[code[15]]}" if code[15] in FILTER_CLASSES else ""
     return Channel(_joined(*place, letter + axis, cfc), quantity, _joined(*moves_with), axis, source)
 
