@@ -46,6 +46,11 @@ def test_numbers_of_a_vax():
     assert_array_equal(_floats(bytes([0xC8, 0x43, 0, 0]) + bytes(4), "VAX"), [100.0, 0.0])
 
 
+def test_a_signalling_nan_is_a_hole(tmp_path):
+    folder = wrong(tmp_path, changed(1536 + 12 + 400, bytes([1, 0, 0xA0, 0x7F])))
+    assert list(np.flatnonzero(np.isnan(read_source(folder).values[:, 0]))) == [100]
+
+
 def wrong(tmp_path, change):
     record, values = records()[0]
     data = bytearray(uds_file(record.split("|"), values, 7292, "IEEE"))

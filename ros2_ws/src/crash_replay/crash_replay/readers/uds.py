@@ -98,13 +98,14 @@ def _numbers(path: Path, data: bytes, at: int, count: int, form: str) -> np.ndar
     raw = b"".join(parts)[: 4 * count]
     if len(raw) < 4 * count:
         raise RecordingError(f"{path}: {count} samples are stated, {len(raw) // 4} are there")
-    return _floats(raw, form).astype(float)
+    return _floats(raw, form)
 
 
 def _floats(raw: bytes, form: str) -> np.ndarray:
     """Singles. VAX: words swapped, and 4 times the IEEE single of the same bits; exponent 0 is zero."""
     if form != "VAX":
-        return np.frombuffer(raw, dtype=f"{BYTE_ORDER[form]}f4")
+        with np.errstate(invalid="ignore"):  # a signalling NaN is one like any other
+            return np.frombuffer(raw, dtype=f"{BYTE_ORDER[form]}f4").astype(float)
     words = np.frombuffer(raw, dtype="<u2").reshape(-1, 2)
     bits = (words[:, 0].astype(np.uint32) << 16) | words[:, 1]
     exponent = (bits >> 23) & 0xFF
