@@ -30,6 +30,7 @@ class Database:
         ]
         self.metadata = metadata_of(folder, number)
         self.one_column = False
+        self.moved: dict[str, str] = {}  # path -> where the answer says that it is now
         self.url = ""
 
     def answer(self, path: str) -> bytes | None:
@@ -103,6 +104,11 @@ def served(database: Database):
             database.asked.append((self.path, asked, self.headers.get("User-Agent", "")))
             waiting = next((faults for part, faults in database.faults.items() if part in self.path and faults), None)
             fault = waiting.pop(0) if waiting else None
+            if self.path in database.moved:
+                self.send_response(302)
+                self.send_header("Location", database.moved[self.path])
+                self.end_headers()
+                return
             body = database.answer(self.path)
             if fault == "silent":
                 time.sleep(0.6)

@@ -8,8 +8,8 @@ import pytest
 from helpers_paths import ROOT
 
 SOURCES = ROOT / "ros2_ws" / "src"
-BESIDES = {"filterpy", "lz4", "zstandard", "setuptools", "rerun_cli"}
-"""Only measured against; what mcap brings along; for setup.py alone; of rerun-sdk."""
+BESIDES = {"filterpy", "lz4", "zstandard", "setuptools", "rerun_cli", "markupsafe", "urllib3"}
+"""Only measured against; what mcap brings along; for setup.py alone; of rerun-sdk; of jinja2; of requests."""
 NAMED = {"rerun": "rerun-sdk", "ruamel": "ruamel.yaml"}
 
 

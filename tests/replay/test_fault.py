@@ -122,7 +122,7 @@ COMMANDS = [
     (simulate, "crash_estimator.cli.work.simulate.load_model", OF_A_BAG),
     (diagnose, "crash_estimator.cli.work.diagnose.load_model", OF_A_BAG),
     (report, "crash_estimator.cli.work.report.load_model", [*OF_A_BAG, "--to", "out"]),
-    (import_command, "crash_replay.import_command.read_source", ["a.csv", "--to", "b.mcap"]),
+    (import_command, "crash_replay.import_work.read_source", ["a.csv", "--to", "b.mcap"]),
     (synthesize_command, "crash_replay.synthesize_command.write_bag", ["impactor_single", "--to", "b.mcap"]),
     (demo, "crash_estimator.demo.start.claim", ["--recording", "a.mcap"]),
 ]

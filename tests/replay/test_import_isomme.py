@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_replay.readers import read_source
-from crash_replay.readers.isomme_codes import channel_of
+from crash_replay.readers.codes.isomme import channel_of
 from crash_replay.recording import RecordingError
 
 MME = """\
@@ -94,6 +94,11 @@ def test_folder(tmp_path, encoding):
         ("14BPILLEUP00ACYD", "second_left_b_pillar_left_upper_ay_cfc60", "second_left_b_pillar_left_upper"),
         ("M0VEHC000000ACXP", "mdb_car_ax", "mdb_car"),
         ("11HEAD0000H3AVZ0", "front_left_head_wz", "front_left_head"),
+        ("17SEBE0000B3FO0P", "third_left_seat_belt_upper_diagonal_f", "third_left_seat_belt_upper_diagonal"),
+        ("10FORALERERDAC1P", "floor_over_rear_axle_left_rear_ax", "car"),
+        ("15PELV00LLQ6MOXF", "second_middle_pelvis_left_lower_mx_cfc600", "second_middle_pelvis_left_lower"),
+        ("1AKNSLLE00THDSXC", "seat_a_knee_slider_left_dx_cfc180", "seat_a_knee_slider_left"),
+        ("10VEHCCG0000VAXD", "car_vx_cfc60", "car"),
         ("11TRRILE01WSDSYP", "front_left_rib_left_01_dy", "front_left_rib_left_01"),
     ],
 )
@@ -101,6 +106,66 @@ def test_names(code, name, body):
     channel = channel_of(code, "", several_objects=False)
     assert (channel.name, channel.body) == (name, body)
     assert channel_of("20HEADCG00H3ACXP", "", several_objects=True).name == "object2_head_ax"
+
+
+def test_a_direction_with_another_sign_is_said(tmp_path):
+    """NHTSA's exports have 1 for the longitudinal direction."""
+    recording = read_source(write_folder(tmp_path, [FILES[0].replace("ACX", "AC1")]))
+    assert recording.test.channels[0].axis == "x"
+    assert any(note.startswith("direction 1, 2 or 3") and "--names" in note for note in recording.test.notes)
+
+
+def long_folder(folder, change=lambda text: text, mme=MME, more=()):
+    """160 ms of a car with three sensors that stops from 15.6 m/s."""
+    time = np.arange(-100, 1500) * 1e-4
+    values = np.where((time >= 0) & (time < 0.08), -15.6 * np.pi / 0.16 * np.sin(np.pi * time / 0.08), 0.0)
+    noise = np.random.default_rng(0).normal(scale=0.1, size=(3, len(time)))
+    codes = ("10VEHCCG0000ACXP", "10SILBLE0000ACXP", "10SILBRI0000ACXP")
+    files = [channel_file(code, values + n, "m/s²", time_of_first_sample="-0.01") for code, n in zip(codes, noise)]
+    return write_folder(folder, [change(files[0]), *files[1:], *more], mme)
+
+
+def test_a_bad_sensor_called_as_the_car_is_not_the_car(tmp_path):
+    flipped = long_folder(tmp_path, lambda text: text.replace("\n-", "\n+"))
+    recording = read_source(flipped)
+    assert any(note.startswith("outlier car_ax") for note in recording.test.notes)
+    assert recording.column("car_ax").min() < -250 and "car_ax_sensor" not in recording.test.channel_names
+    assert "car_ax_sensor" in read_source(flipped, all_sensors=True).test.channel_names
+
+
+def test_what_a_header_says_wrong_is_told(tmp_path):
+    mme = MME.replace(":15.6", ":56.2") + "Velocity test object 2      :fast\n"
+    folder = long_folder(tmp_path, lambda text: text.replace(":1600", ":99").replace(":ok", ":questionable data"), mme)
+    notes = "\n".join(read_source(folder).test.notes)
+    for said in (
+        "velocity test object 1: 56.2 m/s, as the standard has it, are three times",
+        "initial_velocity: {car: 15.61}",
+        "velocity test object 2: expected a velocity, found 'fast'",
+        "the number of samples is not the stated one: T7.001",
+        "status 'questionable data': car_ax",
+    ):
+        assert said in notes
+    assert "km/h?" not in "\n".join(read_source(long_folder(tmp_path)).test.notes)
+
+
+def test_a_header_in_two_bytes_a_letter(tmp_path):
+    folder = long_folder(tmp_path)
+    (folder / "T7.MME").write_text(MME, encoding="utf-16")
+    assert read_source(folder).test.initial_velocity["car"] == 15.6
+    assert read_source(folder).test.title == "Überprüfung"
+
+
+def test_barrier_cells_as_nhtsa_exports_them(tmp_path):
+    cells = [channel_file(f"00LOMA{k:02d}0000FO1P", [-1.0] * 1600, "N", time_of_first_sample="-0.01") for k in (1, 2)]
+    recording = read_source(long_folder(tmp_path, more=cells))
+    assert {"car_ax", "barrier_fx"} <= set(recording.test.channel_names)
+    assert_allclose(recording.column("barrier_fx"), 2.0)
+
+
+def test_a_folder_of_nothing_but_faults_is_one_short_line(tmp_path):
+    with pytest.raises(RecordingError) as raised:
+        read_source(write_folder(tmp_path, [channel_file("10VEHCCG0000ACXP", [1.0], unit="furlong")] * 200))
+    assert len(str(raised.value)) < 2000 and "and 195 more" in str(raised.value)
 
 
 def test_a_velocity_with_its_unit_and_doubled_names(tmp_path):

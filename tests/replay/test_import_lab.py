@@ -158,6 +158,9 @@ def main_status(arguments):
         ("barrier_fx", "force", 60),
         ("car_ax", "acceleration", 60),
         ("engine_ax", "acceleration", 60),
+        ("second_left_b_pillar_upper_ay", "acceleration", 60),
+        ("rear_left_passenger_shoulder_az", "acceleration", 1000),
+        ("seat_a_head_ax", "acceleration", 1000),
     ],
 )
 def test_classes_of_sae_j211(name, quantity, cfc):

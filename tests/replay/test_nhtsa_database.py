@@ -1,9 +1,15 @@
 """`nhtsa:NUMBER` against a server that answers as NHTSA's does: packages, curves, faults, limits, the cache."""
 
+import subprocess
+import sys
+from dataclasses import replace
+from socket import socket
+
 import numpy as np
 import pytest
 from helpers_ev5 import two_cars, write_two_cars
 from helpers_nhtsa_server import Database, client_of, packed, served
+from helpers_uds import CODES, write_uds
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_replay import limits
@@ -92,7 +98,7 @@ def test_without_a_package_that_can_be_used_it_comes_curve_by_curve(
     if fault == "missing":
         database.faults = {"/files/": [404]}
     elif fault == "none named":
-        database.documents = lambda url: [{"evFiles": None, "udsFiles": [f"{url}/files/uds.zip"]}]
+        database.documents = lambda url: [{"evFiles": None, "tdmsFiles": [f"{url}/files/tdms.zip"]}]
     elif fault == "truncated":
         database.package = whole[: len(whole) // 2]
     elif fault == "rotten":
@@ -115,6 +121,12 @@ def test_curves_that_have_come_are_not_asked_again(database, expected):
     before = len(database.asked)
     same(fetched(database), expected, rtol=1e-7)
     assert not any("tsv.001" in path or "tsv.002" in path for path, *_ in database.asked[before:])
+
+
+def test_commands_that_fetch_nothing_do_not_wait_for_the_http_library():
+    """It takes a tenth of a second to import: `--help` and a recording from a file go without."""
+    code = "import sys, crash_replay.readers, crash_replay.import_command; assert 'requests' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
 @pytest.mark.parametrize("one_column", [False, True])
@@ -144,6 +156,15 @@ def test_rows_of_url_and_document_type(database, expected):
     same(fetched(database), expected)
 
 
+def test_a_package_of_uds_files_where_there_is_none_in_ev5_form(database, expected, tmp_path):
+    records = [("|".join(CODES.get(part, part) for part in record.split("|")), values) for record, values in two_cars()]
+    database.package = packed(write_uds(tmp_path / "uds", [*records[:3], records[9]]))
+    database.documents = lambda url: [{"evFiles": None, "udsFiles": [f"{url}/files/uds.zip"], "tdmsFiles": ["t.zip"]}]
+    recording = fetched(database)
+    for name in ("vehicle1_driver_head_ax", "vehicle1_driver_chest_ax"):
+        assert_allclose(recording.column(name), expected.column(name), rtol=1e-4, atol=1e-3)
+
+
 def test_paths_in_a_package_lead_nowhere_else(database, expected, folder, tmp_path):
     database.package = packed(folder, {"../../v07292.998": b"0 1\n", "/etc/v07292.999": b"0 1\n"})
     same(fetched(database), expected)
@@ -168,6 +189,29 @@ def test_what_is_wrong_is_one_line(database, monkeypatch):
     monkeypatch.setenv("CRASH_CACHE", "/dev/null/cache")
     with pytest.raises(Exception, match="cannot be written"):
         read_source(f"nhtsa:{NUMBER}")
+
+
+def test_a_server_that_is_not_there_is_said_in_a_few_words(database, monkeypatch):
+    """Not in the library's own message, with the URL in it three times; a wrong address is not tried again."""
+    with socket() as nobody:
+        nobody.bind(("127.0.0.1", 0))
+        url = f"http://127.0.0.1:{nobody.getsockname()[1]}/api"
+    for api, said in ((url, r"no answer in 4 attempts \(\[Errno 111\] Connection refused\): try again later; what"),
+                      ("elsewhere", r"no answer in 1 attempt \(Invalid URL 'elsewhere/")):  # fmt: skip
+        client = replace(database.client, api=api)
+        with pytest.raises(RecordingError, match=f"^nhtsa:7292: {api}/.*: {said}"):
+            folder_of(f"nhtsa:{NUMBER}", client)
+
+
+def test_a_redirection_is_followed_on_the_databases_hosts_alone(database, expected):
+    database.moved = {"/files/v07292ev5.zip": "/files/elsewhere/v07292ev5.zip"}
+    same(fetched(database), expected)
+
+
+def test_a_redirection_elsewhere_is_not(database):
+    database.moved = {"/files/v07292ev5.zip": "https://elsewhere.example/v07292ev5.zip"}
+    with pytest.raises(RecordingError, match="elsewhere.example/.*: not on a host of NHTSA's: not followed"):
+        fetched(database)
 
 
 def test_a_package_larger_than_allowed_is_not_taken(database, monkeypatch):

@@ -6,7 +6,7 @@ setup(
     name="crash_estimator",
     version="0.1.0",
     packages=find_packages(),
-    package_data={"crash_estimator": ["models/*.yaml", "thesis/*.yaml", "benchmarks/*.cpp"]},
+    package_data={"crash_estimator": ["models/*.yaml", "thesis/*.yaml", "benchmarks/*.cpp", "templates/*.html"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/crash_estimator"]),
         ("share/crash_estimator", ["package.xml"]),

@@ -17,7 +17,7 @@ from . import limits
 from .recording import RecordingError
 
 MAGIC = b"\x89MCAP0\r\n"
-IMPORT = "`import SOURCE --to NEW.mcap` makes a bag of a CSV with its YAML, an EV5 or an ISO-MME folder"
+IMPORT = "`import SOURCE --to NEW.mcap` makes a bag of a CSV with its YAML, an EV5, UDS or ISO-MME folder"
 
 
 @dataclass

@@ -44,8 +44,13 @@ ROWS = (
     _row("barrier|mdb", "force moment", 60, "barrier force"),
     _row("steering_column|steering_wheel", "force moment", 600, "steering column load"),
 )
+PART_OF_A_VEHICLE = re.compile(
+    r"(^|_)([abcd]_pillar|sill|door|door_panel|floor|floorpan|toepan|tunnel|crossmember|seat_cross_member|roof|roof_rail"
+    r"|firewall|bumper|trunk_floor|rear_deck|engine|car)(_|$)"
+)
+"""Also beside a seat: the b-pillar at the driver's is no dummy's."""
 DUMMY = re.compile(
-    r"(^|_)(driver|passenger|occupant\d+|front_left|front_right|second_left|second_right|foot|abdomen)(_|$)"
+    r"(^|_)(driver|passenger|occupant\d*|(front|second|third)_(left|middle|right)|seat_[a-z]|foot|abdomen)(_|$)"
 )
 OTHER_OF_A_DUMMY = ChannelClass(1000, "dummy, no row of its own: the widest class")
 VEHICLE = ChannelClass(60, "vehicle structure, for comparison and simulation")
@@ -57,7 +62,7 @@ def class_of(channel: Channel) -> ChannelClass:
     for row in ROWS:
         if channel.quantity in row.quantities and re.search(row.words, said):
             return row.found
-    return OTHER_OF_A_DUMMY if DUMMY.search(said) else VEHICLE
+    return OTHER_OF_A_DUMMY if DUMMY.search(said) and not PART_OF_A_VEHICLE.search(said) else VEHICLE
 
 
 def frequency_class(text: str) -> int | str:

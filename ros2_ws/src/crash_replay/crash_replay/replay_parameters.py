@@ -12,7 +12,7 @@ ON_A_TERMINAL = ("auto", "true", "false")
 PARAMETERS = {
     "bag": Allowed(
         "",
-        "the recording: a bag, a CSV with its YAML, an NHTSA EV5 or ISO-MME folder, nhtsa:NUMBER",
+        "the recording: a bag, a CSV with its YAML, an NHTSA EV5 or UDS or an ISO-MME folder, nhtsa:NUMBER",
         needed="give a recording, --ros-args -p bag:=PATH",
     ),
     "then": Allowed([""], "recordings to replay after it, one by one, each as a test of its own"),

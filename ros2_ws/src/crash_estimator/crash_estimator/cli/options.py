@@ -5,7 +5,7 @@ import math
 
 from ..ready_models import MODEL
 
-RECORDING = "a recording in any form: bag, CSV with its YAML, NHTSA EV5 or ISO-MME folder, nhtsa:NUMBER"
+RECORDING = "a recording in any form: bag, CSV with its YAML, NHTSA EV5 or UDS or ISO-MME folder, nhtsa:NUMBER"
 
 
 def add_model_option(parser: argparse.ArgumentParser) -> None:

@@ -37,7 +37,7 @@ def _parser() -> Parser:
     )
     parser.add_argument(
         "--recording", type=Path, metavar="PATH",
-        help="a bag, or what `import` reads: CSV with YAML, NHTSA EV5 or ISO-MME folder, nhtsa:NUMBER"
+        help="a bag, or what `import` reads: CSV with YAML, NHTSA EV5 or UDS or ISO-MME folder, nhtsa:NUMBER"
         " (default: a simulated one)",
     )  # fmt: skip
     parser.add_argument(

@@ -24,8 +24,10 @@ from .polite_client import API, CURVES, Missing, PoliteClient, Unreachable
 PREFIX = "nhtsa:"
 CACHE, OTHER_API, OTHER_CURVES = "CRASH_CACHE", "CRASH_NHTSA_API", "CRASH_NHTSA_CURVES"
 """Environment: where tests are kept, and a mirror of the database."""
-FORMS = (re.compile(r"(^|\W)ev5?(files)?(\W|$)", re.IGNORECASE), re.compile(r"(^|\W)iso(files)?(\W|$)", re.IGNORECASE))
-"""What answers call the packages that can be read, the preferred first: evFiles, "EV5 data"."""
+FORMS = tuple(
+    re.compile(rf"(^|[\W_]){form}(files)?([\W_]|$)", re.IGNORECASE) for form in ("ev5?", "iso", "uds")
+)  # fmt: skip
+"""What answers call the packages that can be read, the preferred first: evFiles, "EV5 data", URL_EV5."""
 
 
 def folder_of(source: str, client: PoliteClient | None = None) -> Path:

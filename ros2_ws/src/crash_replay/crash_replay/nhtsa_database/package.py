@@ -8,7 +8,8 @@ from pathlib import Path
 from .. import limits
 from ..recording import RecordingError
 
-WANTED = re.compile(r"[A-Za-z0-9_-]{1,60}\.(EV5|MME|CHN|\d{3,4})", re.IGNORECASE)
+WANTED = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,60}\.(EV5|MME|CHN|UDS|\d{3,4})", re.IGNORECASE)
+HEADERS = (".EV5", ".MME", ".UDS")
 """A header or a curve; whatever else lies in the package stays there."""
 COPIED = 1 << 20
 
@@ -27,8 +28,8 @@ def unpack(package: Path, folder: Path) -> None:
             wanted = [entry for entry in archive.infolist() if WANTED.fullmatch(Path(entry.filename).name)]
             if wrong := limits.count_wrong("has", len(archive.infolist()), limits.PACKED_FILES):
                 raise RecordingError(f"{package.name}: {wrong}")
-            if not any(entry.filename.upper().endswith((".EV5", ".MME")) for entry in wanted):
-                raise DamagedPackage("it has no .EV5 and no .mme header")
+            if not any(entry.filename.upper().endswith(HEADERS) for entry in wanted):
+                raise DamagedPackage("it has no .EV5 and no .mme header, and no UDS file")
             allowed = max(limits.UNPACKED_SMALL, limits.UNPACKED_RATIO * package.stat().st_size)
             left = int(min(limits.UNPACKED.highest, allowed))
             for entry in wanted:

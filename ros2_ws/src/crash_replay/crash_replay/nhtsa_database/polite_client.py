@@ -5,15 +5,16 @@ Nothing that an answer says is followed but a package's own URL, and that only o
 
 import json
 import time
-import urllib.error
-import urllib.request
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from email.message import Message
-from http.client import HTTPException
+from functools import cached_property
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import urljoin, urlsplit
+
+import requests
+from requests import exceptions as failures
+from urllib3.exceptions import HTTPError as BrokenAnswer
 
 from .. import limits
 from ..progress import Counter
@@ -27,6 +28,9 @@ CHUNK = 1 << 18  # bytes
 TRY_AGAIN = (408, 429, 500, 502, 503, 504)
 LONGEST_WAIT = 60.0
 """s: a server that asks for a longer pause is not waited for."""
+IN_VAIN = (failures.InvalidURL, failures.InvalidSchema, failures.MissingSchema, failures.SSLError,
+           failures.TooManyRedirects, failures.InvalidProxyURL)  # fmt: skip
+"""What asking again does not mend."""
 
 
 class Missing(Exception):
@@ -35,6 +39,14 @@ class Missing(Exception):
 
 class Unreachable(RecordingError):
     """The server did not answer, as often as it was asked."""
+
+
+class Refused(Exception):
+    """An answer that is none: its status."""
+
+    def __init__(self, response: requests.Response):
+        super().__init__(f"status {response.status_code} {response.reason}")
+        self.code, self.headers = response.status_code, response.headers
 
 
 @dataclass(frozen=True)
@@ -68,15 +80,15 @@ class PoliteClient:
         self._again(url, lambda: self._append(url, to))
 
     def _again(self, url: str, attempt: Callable[[], Any]) -> Any:
-        pause, why = self.first_wait, ""
-        for k in range(self.attempts):
-            if k:
+        pause, why, tried = self.first_wait, "", 0
+        for tried in range(1, self.attempts + 1):
+            if tried > 1:
                 self.wait(pause)
                 pause *= 2.0
             try:
                 return attempt()
-            except urllib.error.HTTPError as error:
-                why = f"status {error.code} {error.reason}"
+            except Refused as error:
+                why = str(error)
                 if error.code in (404, 410):
                     raise Missing(url) from None
                 if error.code not in TRY_AGAIN:
@@ -84,43 +96,60 @@ class PoliteClient:
                 pause = max(pause, _asked_pause(error.headers))
                 if pause > LONGEST_WAIT:
                     break
-            except (OSError, HTTPException) as error:  # time-outs, broken connections, URLError
-                why = str(getattr(error, "reason", error)) or type(error).__name__
-        raise Unreachable(f"{url}: no answer in {self.attempts} attempts ({why}): try again later")
+            except IN_VAIN as error:
+                why = _reason(error)
+                break
+            except (OSError, BrokenAnswer) as error:  # time-outs, broken connections; those of requests are OSErrors
+                why = _reason(error)
+        attempts = "1 attempt" if tried == 1 else f"{tried} attempts"
+        raise Unreachable(f"{url}: no answer in {attempts} ({why}): try again later")
 
-    def _open(self, url: str, start: int = 0):
-        headers = {"User-Agent": AGENT} | ({"Range": f"bytes={start}-"} if start else {})
-        request = urllib.request.Request(url, headers=headers)
-        opener = urllib.request.build_opener(_SameHosts(self))
-        return opener.open(request, timeout=self.timeout)
+    @cached_property
+    def _session(self) -> requests.Session:
+        """One connection for all curves. Packed answers are not asked for: lengths and ranges are in bytes."""
+        session = _DatabaseSession(self._check_host)
+        session.headers.update({"User-Agent": AGENT, "Accept-Encoding": "identity"})
+        return session
+
+    def _open(self, url: str, start: int = 0) -> requests.Response:
+        headers = {"Range": f"bytes={start}-"} if start else {}
+        response = self._session.get(url, headers=headers, timeout=self.timeout, stream=True)
+        if not response.ok:
+            response.close()
+            raise Refused(response)
+        return response
 
     def _whole(self, url: str, limit: limits.Range) -> bytes:
+        body = bytearray()
         with self._open(url) as response:
-            body = response.read(int(limit.highest) + 1)
-            _check_whole(response.headers, len(body))
+            while len(body) <= limit.highest and (chunk := response.raw.read1(CHUNK, decode_content=True)):
+                body += chunk
+            if len(body) <= limit.highest and len(body) < _length(response):
+                raise ConnectionError(f"{len(body)} of {_length(response)} bytes came")
         if wrong := limits.count_wrong("has", len(body), limit):
             raise RecordingError(f"{url}: {wrong}")
-        return body
+        return bytes(body)
 
     def _append(self, url: str, to: Path) -> None:
         had = to.stat().st_size if to.exists() else 0
         try:
             response = self._open(url, had)
-        except urllib.error.HTTPError as error:
+        except Refused as error:
             if error.code == 416:  # nothing after what is here: complete, or another file by now
                 return
             raise
         with response:
-            if had and response.status != 206:  # it sends all of it again
+            if had and response.status_code != 206:  # it sends all of it again
                 had = 0
-            length = int(response.headers.get("Content-Length") or 0)
+            length = _length(response)
             total = had + length
             if wrong := limits.count_wrong("has", total, limits.PACKAGE):
                 raise RecordingError(f"{url}: {wrong}")
             with to.open("ab" if had else "wb") as file:
                 come = had
                 counter = Counter("downloading, MB", max(1, total // 1_000_000))
-                while chunk := response.read(CHUNK):
+                # read1: what has come when the connection breaks is written, and gone on with
+                while chunk := response.raw.read1(CHUNK):
                     come += len(chunk)
                     if wrong := limits.count_wrong("has", come, limits.PACKAGE):
                         raise RecordingError(f"{url}: {wrong}")
@@ -136,24 +165,34 @@ class PoliteClient:
         raise RecordingError(f"{limits.shown(url)}: not on a host of NHTSA's: not followed")
 
 
-class _SameHosts(urllib.request.HTTPRedirectHandler):
+class _DatabaseSession(requests.Session):
     """Redirections stay on the database's hosts."""
 
-    def __init__(self, client: PoliteClient):
-        self.client = client
+    def __init__(self, check_host: Callable[[str], None]):
+        super().__init__()
+        self.check_host = check_host
 
-    def redirect_request(self, request, file, code, message, headers: Message, url: str):
-        self.client._check_host(url)
-        return super().redirect_request(request, file, code, message, headers, url)
-
-
-def _check_whole(headers: Message, length: int) -> None:
-    stated = headers.get("Content-Length", "")
-    if stated.isdigit() and length < int(stated):
-        raise ConnectionError(f"{length} of {stated} bytes came")
+    def get_redirect_target(self, resp: requests.Response) -> str | None:
+        target = super().get_redirect_target(resp)
+        if target:
+            self.check_host(urljoin(resp.url, target))
+        return target
 
 
-def _asked_pause(headers: Message) -> float:
+def _length(response: requests.Response) -> int:
+    """Bytes that the server says will come; 0 where it does not, or sends them packed all the same."""
+    stated = response.headers.get("Content-Length", "")
+    return int(stated) if stated.isdigit() and not response.headers.get("Content-Encoding") else 0
+
+
+def _reason(error: BaseException) -> str:
+    """The innermost cause in its own words: the libraries wrap it in theirs, with the whole URL in each."""
+    while cause := error.__cause__ or error.__context__:
+        error = cause
+    return str(error) or type(error).__name__
+
+
+def _asked_pause(headers: Mapping[str, str]) -> float:
     """s, of Retry-After where it is a number."""
-    stated = (headers or {}).get("Retry-After", "") or ""
+    stated = headers.get("Retry-After", "") or ""
     return float(stated) if stated.isdigit() else 0.0

@@ -4,10 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from .. import forms
 from ..bag import read_bag
 from ..bag_namespace import parted
 from ..recording import Recording, RecordingError
-from . import csv_yaml, isomme, nhtsa
+from . import csv_yaml, isomme, nhtsa, nhtsa_uds
 from .description import apply_names
 
 NHTSA = "nhtsa:"
@@ -29,10 +30,11 @@ def is_bag(path: Path) -> bool:
 
 
 READERS = (
-    Reader("a .csv file with a .yaml of the same name beside it", csv_yaml.found, csv_yaml.read),
-    Reader("a folder with an .EV5 header", nhtsa.found, nhtsa.read, ("cells", "all_sensors")),
-    Reader("a folder with an .mme header", isomme.found, isomme.read, ("all_sensors",)),
-    Reader("a bag (a rosbag2 folder or an .mcap file)", is_bag, read_bag, ("recover",)),
+    Reader(forms.CSV, csv_yaml.found, csv_yaml.read),
+    Reader(forms.EV5, nhtsa.found, nhtsa.read, ("cells", "all_sensors")),
+    Reader(forms.UDS, nhtsa_uds.found, nhtsa_uds.read, ("cells", "all_sensors")),
+    Reader(forms.MME, isomme.found, isomme.read, ("all_sensors",)),
+    Reader(forms.BAG, is_bag, read_bag, ("recover",)),
 )
 
 

@@ -48,7 +48,8 @@ def body_motion(
     pushed = impulse(time, barrier) if barrier is not None and len(masses) == 1 else None
     compared = {body: _compared(time, members) for body, members in bodies.items() if _rigid(body)}
     compared |= _by_momentum(time, bodies, compared, masses, pushed)
-    taken = {sensor.channel.name for sensor in sensors}
+    dropped = {bodies[body][k].channel.name for body, found in compared.items() for k in found.outliers}
+    taken = {sensor.channel.name for sensor in sensors} - dropped
     columns, outliers, notes = {}, [], []
     for body, members in bodies.items():
         found = compared.get(body)

@@ -3,6 +3,7 @@
 The fields follow NHTSA's test reference guide, version 5.
 """
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -27,11 +28,11 @@ class Curve(NamedTuple):
     calibration: str
     full_scale: str
     full_scale_used: str  # %
-    initial_velocity: float  # km/h along the axis
+    initial_velocity: float  # km/h along the axis; NaN where it is not stated
     first: int  # index of the first sample; time zero is index 0
     last: int
     step: float  # us
-    status: str  # AM as measured, CM computed, CF failed, NO none
+    status: str  # AM as measured, CM computed, CF failed, MN meaningless, SF system failed, QD questionable, NO none
     redundancy: str  # P primary, R redundant
     comment: str
 
@@ -46,6 +47,12 @@ class Header(NamedTuple):
     impact_angle: float  # degrees between the vehicles' long axes
     masses: dict[int, float]  # vehicle -> test mass in kg
     curves: tuple[Curve, ...]
+    wrong: tuple[tuple[str, str], ...] = ()  # records that are at fault: why, and which line
+
+    @property
+    def vehicles(self) -> int:
+        """How many there are, by their own records or by those of their sensors."""
+        return len({*self.masses, *(curve.vehicle for curve in self.curves)} - {0})
 
     @property
     def along_one_line(self) -> bool:
@@ -64,6 +71,7 @@ NUMERIC = {
     "step": (float, Range(0, 1e7, "us", "0 of a sensor that is not fitted")),
 }
 """A curve's fields that are numbers, of what kind, and what they may be."""
+UNKNOWN = ("", "N/A", "NA", "UNK", "UN", "UNKNOWN", "NULL")
 TEST_FIELDS = 20
 SMALL_ANGLE = 1.0
 """Degrees: its cosine is one within 0.02 %."""
@@ -83,13 +91,14 @@ def read_header(path: Path) -> Header:
     for number, line in enumerate(lines, start=1):
         if line.startswith("-----"):
             name = line.strip("- \r")
-        elif name and line.strip():
+        elif name and line.strip() and not line.startswith("#"):  # a comment may stand anywhere
             sections.setdefault(name, []).append((number, line.rstrip("\r").split("|")))
     for wanted in ("TEST", "INSTRUMENTATION"):
         if not sections.get(wanted):
             raise RecordingError(
                 f"{path}: expected an EV5 header with a section `----- {wanted} -----` and records in it"
             )
+    curves, wrong = _curves(path, sections["INSTRUMENTATION"])
     line, test = sections["TEST"][0]
     if len(test) < TEST_FIELDS:
         raise RecordingError(f"{path}:{line}: expected {TEST_FIELDS} fields in a TEST record, found {len(test)}")
@@ -99,16 +108,17 @@ def read_header(path: Path) -> Header:
         date=test[3],
         laboratory=test[4],
         configuration=test[8],
-        closing_speed=_number(path, line, "closing speed", test[14], SPEED),
+        closing_speed=_number(path, line, "closing speed", _stated(test[14]), SPEED),
         impact_angle=_angle(test[15]),
         masses={
             int(_number(path, n, "vehicle", f[0], NUMERIC["vehicle"][1])): _number(
-                path, n, "test mass", f[10], TEST_MASS
+                path, n, "test mass", _stated(f[10]), TEST_MASS
             )
             for n, f in sections.get("VEHICLE", [])
             if len(f) > 10
         },
-        curves=tuple(_curve(path, n, fields) for n, fields in sections["INSTRUMENTATION"]),
+        curves=curves,
+        wrong=wrong,
     )
 
 
@@ -119,14 +129,39 @@ def _test_number(path: Path, lines: Sequence[str]) -> str:
     return path.stem.lstrip("vV")
 
 
+def _curves(path: Path, records: Sequence[tuple[int, Sequence[str]]]) -> tuple[tuple[Curve, ...], tuple]:
+    """The curves, and of each record at fault why and where: it costs only itself. Raises where none is left."""
+    curves, wrong = [], []
+    for line, fields in records:
+        try:
+            curves.append(_curve(path, line, fields))
+        except RecordingError as error:
+            if len(records) == 1:
+                raise
+            wrong.append((str(error).removeprefix(f"{path}:{line}: "), f"line {line} of {path.name}"))
+    if not curves:
+        raise RecordingError(f"{path}: none of {len(wrong)} INSTRUMENTATION records can be read: {wrong[0][0]}")
+    return tuple(curves), tuple(wrong)
+
+
+def _stated(text: str) -> str:
+    """A number that may be left blank, or said to be unknown: 0 then."""
+    return "0" if text.strip().upper() in UNKNOWN else text
+
+
 def _curve(path: Path, line: int, fields: Sequence[str]) -> Curve:
+    if len(fields) > len(Curve._fields):  # a commentary may have the separator in it
+        last = len(Curve._fields) - 1
+        fields = [*fields[:last], "|".join(fields[last:]).strip("| ")]
     if len(fields) != len(Curve._fields):
         raise RecordingError(
             f"{path}:{line}: expected {len(Curve._fields)} fields in an INSTRUMENTATION record, found {len(fields)}"
         )
     given = dict(zip(Curve._fields, (field.strip() for field in fields), strict=False))
     for name, (kind, limit) in NUMERIC.items():
-        given[name] = kind(_number(path, line, name, given[name], limit))
+        # what is not determined is left blank: a velocity then is none, a count is an error
+        unstated = name == "initial_velocity" and given[name].upper() in UNKNOWN
+        given[name] = math.nan if unstated else kind(_number(path, line, name, given[name], limit))
     return Curve(**given)
 
 

@@ -9,6 +9,7 @@ import re
 from array import array
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,8 +21,9 @@ from ..recording import Channel, Recording, RecordingError, Test
 from ..shortened import shortened
 from ..unique_names import unique
 from .body_means import Sensor, body_motion
+from .codes.isomme import channel_of, is_time, object_of, other_sign
 from .dates import stamp_of
-from .isomme_codes import channel_of, is_time
+from .isomme_velocity import initial_velocity
 from .units import si_factor
 
 NO_VALUE = "NOVALUE"
@@ -100,15 +102,24 @@ def read(path: Path, all_sensors: bool = False) -> Recording:
             notes.append(f"left out, {file.name}: {str(why).removeprefix(f'{file}:').strip()}")
     tracks = _tracks(files, notes)
     if not tracks:
-        raise RecordingError(f"{path}: no channel can be used: {'; '.join(notes)}")
+        raise RecordingError(f"{path}: no channel can be used: {shortened(notes)}")
     tracks, time_ns, values = _common_time(path, tracks, notes)
     channels = unique([track.channel for track in tracks])
+    if turned := [channel.name for track, channel in zip(tracks, channels) if other_sign(track.code)]:
+        notes.append(
+            f"direction 1, 2 or 3 in the code: the sign is not that of SAE J211: turn what looks wrong with --names "
+            f"(sign: -1): {shortened(turned)}"
+        )
     if any(_on_barrier(track.code, channel) for track, channel in zip(tracks, channels)):
         notes.append("barrier forces keep their recorded sign; a model expects compression to be positive")
     made, outliers = _made_of_several(header, tracks, channels, time_ns, values, notes)
-    columns = made | {c: v for c, v in zip(channels, values.T) if all_sensors or c.name not in outliers}
+    means = {channel.name for channel in made}
+    kept = [replace(c, name=f"{c.name}_sensor") if c.name in means else c for c in channels]
+    columns = made | {c: v for c, own, v in zip(kept, channels, values.T) if all_sensors or own.name not in outliers}
     source = [header.get("laboratory name"), header.get("date of the test"), headers[0].name]
-    velocity = _initial_velocity(header, tracks, notes)
+    bodies = [(track.code[0], track.channel.body) for track in tracks]
+    velocity, about = initial_velocity(header.file, header.header, bodies, time_ns * 1e-9, columns)
+    notes += about
     try:
         test = Test(
             id=header.get("test number") or header.get("laboratory test ref. number") or headers[0].stem,
@@ -131,8 +142,9 @@ def _read_file(file: Path) -> MmeFile:
         data = file.read_bytes()
     except OSError as error:
         raise RecordingError(f"{file}: cannot be read: {error.strerror or error}") from None
+    wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
     try:
-        lines = data.decode("utf-8-sig").splitlines()
+        lines = data.decode("utf-16" if wide else "utf-8-sig").splitlines()
     except UnicodeDecodeError:  # older editions of the standard
         lines = data.decode("latin-1").splitlines()
     header: dict[str, str] = {}
@@ -154,7 +166,8 @@ def _read_file(file: Path) -> MmeFile:
 def _tracks(files: Sequence[MmeFile], notes: list[str]) -> list[Track]:
     """The usable channels; a note for each of the others."""
     by_code = {file.code: file for file in files}
-    several = len({code[:1] for code in by_code if code[:1].isdigit()}) > 1
+    several = len({object_of(code) for code in by_code if object_of(code).isdigit()}) > 1
+    doubted: dict[str, list[str]] = {}
     tracks = []
     for file in files:
         if is_time(file.code):
@@ -167,8 +180,14 @@ def _tracks(files: Sequence[MmeFile], notes: list[str]) -> list[Track]:
             channel = channel_of(file.code, f"{file.file.name}: {file.code}, {unit}", several)
             values = limits.valid_values(file.values, si_factor(channel.quantity, unit))
             tracks.append(Track(file.code, channel, _time_ns(file, by_code), values))
+            stated = file.get("number of samples")
+            if stated.isdigit() and int(stated) != len(values):
+                doubted.setdefault("the number of samples is not the stated one", []).append(file.file.name)
+            if status not in ("", "ok"):
+                doubted.setdefault(f"status {limits.shown(status)}", []).append(channel.name)
         except RecordingError as why:
             notes.append(f"left out, {file.file.name}: {why}")
+    notes += [f"{why}: {shortened(names)}" for why, names in doubted.items()]
     return tracks
 
 
@@ -216,7 +235,7 @@ def _common_time(path: Path, tracks: Sequence[Track], notes: list[str]) -> tuple
 
 
 def _on_barrier(code: str, channel: Channel) -> bool:
-    return code[0] == "B" and channel.quantity == "force"
+    return object_of(code) == "B" and channel.quantity == "force"
 
 
 def _made_of_several(
@@ -255,23 +274,3 @@ def _masses(header: MmeFile, tracks: Sequence[Track]) -> dict[str, float]:
         if track.channel.body.endswith("car") and re.fullmatch(r"\d+(\.\d+)?", stated) and float(stated) > 0:
             masses[track.channel.body] = float(stated)
     return masses
-
-
-def _initial_velocity(header: MmeFile, tracks: Sequence[Track], notes: list[str]) -> dict[str, float]:
-    """m/s of each body of a test object whose velocity the header gives (in m/s, or with its unit)."""
-    velocity: dict[str, float] = {}
-    for key in header.header:
-        test_object = re.fullmatch(r"velocity test object (\w)(?: lon\.?)?", key)
-        stated = re.fullmatch(r"([-+]?[0-9.]+(?:[eE][-+]?\d+)?) *(\S*)", header.get(key))
-        if test_object and stated:
-            try:
-                speed = float(stated[1]) * si_factor("velocity", stated[2] or "m/s")
-                if wrong := limits.VELOCITY.wrong(speed):
-                    raise RecordingError(wrong)
-            except ValueError as error:
-                raise RecordingError(f"{header.file}: {key}: {error}") from None
-            bodies = dict.fromkeys(track.channel.body for track in tracks if track.code[0] == test_object[1])
-            velocity |= dict.fromkeys(bodies, speed)
-            if bodies:
-                notes.append(f"initial velocity {speed:.4g} m/s along the object's own x: {shortened(list(bodies))}")
-    return velocity

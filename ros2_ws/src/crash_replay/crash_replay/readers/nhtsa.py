@@ -5,55 +5,27 @@ Made of the curves: `barrier_fx`, the sum of the barrier's load cells, positive 
 (`body_means`). What is left out, and why, is in the test's notes.
 """
 
-import re
+import math
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from .. import limits
-from ..progress import with_progress
 from ..recording import Channel, Recording, RecordingError, Test
 from ..shortened import shortened
 from .body_means import BodyMotion, Sensor, body_motion
+from .codes.nhtsa import QUESTIONABLE, location_of
 from .dates import stamp_of
 from .ev5 import Curve, Header, read_header
-from .ev5_codes import location_of
 from .left_out import summary
-from .nhtsa_names import axis_of, body_of, channel_names
-from .units import KMH, quantity_of, si_factor
-
-VALID_UNTIL = re.compile(r"no valid data after (\d+(?:\.\d+)?) *ms", re.IGNORECASE)
-ON_GRID = 0.01
-"""Share of the sample period by which a file's times may be off the header's."""
+from .nhtsa_curves import LeftOut, Track, ev5_samples, read_tracks
+from .nhtsa_names import axis_of
+from .units import KMH, quantity_of
 
 LASTS = 0.8
 """Share of the record that a body's motion must be known for."""
-
-
-class Track(NamedTuple):
-    """A curve that can be used: SI values at the indices first, first + 1, ... (index 0 is time zero)."""
-
-    curve: Curve
-    channel: Channel
-    first: int
-    values: np.ndarray
-
-    @property
-    def end(self) -> int:
-        return self.first + len(self.values)
-
-    def on(self, start: int, end: int) -> np.ndarray:
-        """(end - start,) values at the indices from start, NaN where there is none."""
-        column = np.full(end - start, np.nan)
-        column[self.first - start : self.end - start] = self.values
-        return column
-
-
-class Unusable(Exception):
-    """Why a curve is left out."""
 
 
 def found(path: Path) -> bool:
@@ -70,11 +42,18 @@ def read(path: Path, cells: bool = False, all_sensors: bool = False) -> Recordin
     if len(headers) != 1:
         raise RecordingError(f"{path}: expected one .EV5 header, found {', '.join(h.name for h in headers) or 'none'}")
     header = read_header(headers[0])
-    tracks, left_out = _read_tracks(headers[0], header)
+    tracks, left_out = read_tracks(header, ev5_samples(headers[0], header))
     if not tracks:
         raise RecordingError(
             f"{path}: none of the header's {len(header.curves)} curves has a file {headers[0].stem}.NNN to use"
         )
+    return recording_of(path, header, tracks, left_out, cells, all_sensors)
+
+
+def recording_of(
+    path: Path, header: Header, tracks: list[Track], left_out: LeftOut, cells: bool, all_sensors: bool
+) -> Recording:
+    """What NHTSA's formats have in common: one time base, the bodies' means, the notes."""
     step = Counter(track.curve.step for track in tracks).most_common(1)[0][0]
     other = [track for track in tracks if track.curve.step != step]
     left_out += [(track.curve, f"sampled at another rate than {1e6 / step:g} Hz") for track in other]
@@ -94,7 +73,15 @@ def read(path: Path, cells: bool = False, all_sensors: bool = False) -> Recordin
         for track in tracks
         if track.curve.vehicle != 0 and track.channel.name not in dropped
     }
-    notes = [*_about(header), *motion.notes, *of_barrier, *_short(columns, start, step), *_summary(left_out)]
+    notes = [
+        *_about(header),
+        *_questionable(tracks),
+        *motion.notes,
+        *of_barrier,
+        *_short(columns, start, step),
+        *_summary(left_out),
+        *(summary(why, [], where) for why, where in header.wrong),
+    ]
     if not columns:
         raise RecordingError(f"{path}: no curve but of the barrier's cells, and their sum cannot be made")
     try:
@@ -113,63 +100,12 @@ def read(path: Path, cells: bool = False, all_sensors: bool = False) -> Recordin
 
 
 def _headers(folder: Path) -> list[Path]:
-    return sorted(entry for entry in folder.iterdir() if entry.suffix.upper() == ".EV5")
-
-
-def _read_tracks(header_file: Path, header: Header) -> tuple[list[Track], list[tuple[Curve, str]]]:
-    """The usable curves, and the others with the reason why they are not."""
-    tracks, left_out = [], []
-    vehicles = len(header.masses)
-    named = list(zip(header.curves, channel_names(header.curves, vehicles)))
-    for curve, name in with_progress(named, "reading curve"):
-        try:
-            tracks.append(_read_track(header_file, curve, name, body_of(curve, vehicles)))
-        except Unusable as why:
-            left_out.append((curve, str(why)))
-    return tracks, left_out
-
-
-def _read_track(header_file: Path, curve: Curve, name: str, body: str) -> Track:
-    until = VALID_UNTIL.search(curve.comment)
-    if curve.status == "NO":
-        raise Unusable("sensor not fitted")
-    if curve.status == "CF" and not until:
-        raise Unusable("no valid data, says the header")
-    quantity = quantity_of(curve.unit)
-    if quantity is None:
-        raise Unusable(f"unit {curve.unit} has no ROS message")
-    if limits.PERIOD.wrong(curve.step * 1e-6):
-        raise Unusable(f"its step of {curve.step:g} us is none")
-    file = header_file.with_name(f"{header_file.stem}.{curve.number:03d}")
-    if not file.is_file():
-        raise Unusable("no data file")
-    table = _table(file)
-    if wrong := limits.times_wrong(table[:, 0]):
-        raise Unusable(f"{file.name}: {wrong}")
-    index = table[:, 0] / (curve.step * 1e-6)
-    first = round(index[0])
-    if np.any(np.abs(index - first - np.arange(len(index))) > ON_GRID):
-        raise Unusable(f"{file.name}: its times are not the header's steps of {curve.step:g} us")
-    values = limits.valid_values(table[:, 1], si_factor(quantity, curve.unit))
-    if until:
-        ends = min(float(until[1]), limits.TIME.highest * 1e3)  # ms
-        values = values[: max(0, round(ends * 1e3 / curve.step) - first)]
-    source = f"{file.name}: {curve.comment.split(':')[0]}, {curve.unit}, prefilter {curve.prefilter} Hz"
-    return Track(curve, Channel(name, quantity, body, axis_of(curve), source), first, values)
-
-
-def _table(file: Path) -> np.ndarray:
-    """(n, 2) time in s and value. Raises Unusable."""
-    try:
-        if wrong := limits.file_wrong(file, limits.CURVE_FILE):
-            raise Unusable(f"{file.name} {wrong}")
-        lines = file.read_text(encoding="latin-1").splitlines()
-        table = np.loadtxt(lines, ndmin=2) if any(line.strip() for line in lines) else np.empty((0, 2))
-    except (ValueError, OSError) as error:
-        raise Unusable(f"{file.name} is damaged ({limits.shown(str(error))})") from None
-    if table.shape[1:] != (2,) or not len(table):
-        raise Unusable(f"{file.name}: expected the two columns time and value")
-    return table
+    """In the folder or, as a test is submitted, in its folder DATA."""
+    inner = [entry for entry in folder.iterdir() if entry.name.upper() == "DATA" and entry.is_dir()]
+    for place in (folder, *inner):
+        if found := sorted(entry for entry in place.iterdir() if entry.suffix.upper() == ".EV5"):
+            return found
+    return []
 
 
 def _body_motion(
@@ -191,7 +127,7 @@ def _body_motion(
                 near = location_of(track.curve.location, track.curve.comment).near
                 sensors.append(Sensor(track.channel, track.on(start, end), near))
                 numbers[track.channel] = f"curve {track.curve.number}"
-    vehicles = len(header.masses)
+    vehicles = header.vehicles
     cars = {f"vehicle{k}_car" if vehicles > 1 else "car": mass for k, mass in header.masses.items() if mass > 0}
     if vehicles > 1 and not header.along_one_line:
         cars = {}
@@ -240,13 +176,19 @@ def _initial_velocity(tracks: Sequence[Track]) -> dict[str, float]:
     """m/s along x of each body, from the first of its accelerometers along x."""
     velocity: dict[str, float] = {}
     for track in tracks:
-        if track.channel.quantity == "acceleration" and track.channel.axis == "x":
+        stated = math.isfinite(track.curve.initial_velocity)
+        if track.channel.quantity == "acceleration" and track.channel.axis == "x" and stated:
             velocity.setdefault(track.channel.body, track.curve.initial_velocity * KMH)
     return velocity
 
 
+def _questionable(tracks: Sequence[Track]) -> list[str]:
+    named = [track.channel.name for track in tracks if track.curve.status == QUESTIONABLE]
+    return [f"questionable, says the header: {shortened(named)}"] if named else []
+
+
 def _about(header: Header) -> list[str]:
-    masses = ", ".join(f"{mass:g} kg" for mass in header.masses.values())
+    masses = ", ".join(f"{mass:g} kg" for mass in header.masses.values() if mass > 0)
     return [f"closing speed {header.closing_speed:g} km/h" + (f", test mass {masses}" if masses else "")]
 
 
@@ -265,7 +207,7 @@ def _short(columns: dict[Channel, np.ndarray], start: int, step: float) -> list[
     return notes
 
 
-def _summary(left_out: Sequence[tuple[Curve, str]]) -> list[str]:
+def _summary(left_out: LeftOut) -> list[str]:
     """One note for each reason: ranges of curves, the barrier's many moments as a number."""
     reasons: dict[str, list[Curve]] = {}
     for curve, why in left_out:

@@ -17,8 +17,8 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
+from .codes.nhtsa import location_of, occupant_of
 from .ev5 import Curve
-from .ev5_codes import location_of, occupant_of
 from .units import quantity_of
 
 LETTER = {
@@ -29,8 +29,12 @@ LETTER = {
     "moment": "m",
     "angular_velocity": "w",
 }
-NOTHING = re.compile(r"(NO|NONE|N/?A|UNKNOWN)?\W*(COMMENTS?|COMMENTARY)?\W*")
+NOTHING = re.compile(r"(NO|NONE|NOT|N/?A|UNKNOWN)?\W*(COMMENTS?|COMMENTARY|APPLICABLE)?\W*")
 """A comment that says nothing: NO COMMENTS, NONE, N/A."""
+NOR_DOES = re.compile(
+    r"ACCEL(EROMETER)?\.? LOCATION *#? *\d+|\b(NO|NOT) (COMMENTS?|APPLICABLE)|(CURVE|CHANNEL) *#? *\d+\b"
+)
+"""Parts of a comment that name no place: ACCEL. LOCATION #1, NO COMMENTS stands in the headers of side impacts."""
 SAID_BY_CODES = re.compile(
     r"\b([FMA]?[XYZ]R?|RED|REDUNDANT|PRIMARY|ACCELERATION|ANGULAR|VELOCITY|DISPLACEMENT|DEFLECTION"
     r"|FORCE|MOMENT|LOAD|CELL)\b"
@@ -46,7 +50,7 @@ def axis_of(curve: Curve) -> str:
 
 def place(curve: Curve) -> str:
     """Where the sensor is, as a part of a name."""
-    text = curve.comment.split(":")[0].upper().strip()
+    text = NOR_DOES.sub(" ", curve.comment.split(":")[0].upper()).strip()
     if NOTHING.fullmatch(text):
         named = location_of(curve.location, "").name
         owner = "barrier" if curve.vehicle == 0 else occupant_of(curve.occupant)

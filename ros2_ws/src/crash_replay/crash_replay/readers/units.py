@@ -10,12 +10,33 @@ DEGREE = 0.017453292519943295
 """rad"""
 POUND_FORCE = 4.4482216152605
 """N"""
+POUND_MASS = 0.45359237
+"""kg"""
 KMH = 1.0 / 3.6
 """m/s"""
 
 FACTORS: Mapping[str, Mapping[str, float]] = {
-    "acceleration": {"m/s^2": 1.0, "m/s2": 1.0, "m/(s*s)": 1.0, "mm/s^2": 1e-3, "mm/ms^2": 1e3, "g": G, "G'S": G},
-    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "mm/ms": 1.0, "km/h": KMH, "kph": KMH, "mph": 0.44704, "KPH": KMH},
+    "acceleration": {
+        "m/s^2": 1.0,
+        "m/s2": 1.0,
+        "m/(s*s)": 1.0,
+        "m/s**2": 1.0,
+        "m/s\N{SUPERSCRIPT TWO}": 1.0,
+        "mm/s^2": 1e-3,
+        "mm/ms^2": 1e3,
+        "g": G,
+        "G'S": G,
+    },
+    "velocity": {
+        "m/s": 1.0,
+        "mm/s": 1e-3,
+        "mm/ms": 1.0,
+        "km/h": KMH,
+        "kph": KMH,
+        "mph": 0.44704,
+        "KPH": KMH,
+        "MPH": 0.44704,
+    },
     "displacement": {
         "m": 1.0,
         "mm": 1e-3,
@@ -30,12 +51,25 @@ FACTORS: Mapping[str, Mapping[str, float]] = {
         "ft": 0.3048,
         "MM": 1e-3,
         "CM": 1e-2,
+        "CMS": 1e-2,
+        "MET": 1.0,
+        "INS": 0.0254,
     },
-    "force": {"N": 1.0, "kN": 1e3, "lbf": POUND_FORCE, "NWT": 1.0},
-    "moment": {"N*m": 1.0, "N m": 1.0, "Nm": 1.0, "N*mm": 1e-3, "Nmm": 1e-3, "kN*m": 1e3, "NWM": 1.0},
-    "angular_velocity": {"rad/s": 1.0, "deg/s": DEGREE, "rpm": 6.0 * DEGREE, "DPS": DEGREE},
+    "force": {"N": 1.0, "kN": 1e3, "lbf": POUND_FORCE, "NWT": 1.0, "LBS": POUND_FORCE, "KLB": 1e3 * POUND_FORCE},
+    "moment": {
+        "N*m": 1.0,
+        "N m": 1.0,
+        "Nm": 1.0,
+        "N*mm": 1e-3,
+        "Nmm": 1e-3,
+        "kN*m": 1e3,
+        "NWM": 1.0,
+        "LBF": 0.3048 * POUND_FORCE,
+    },
+    "angular_velocity": {"rad/s": 1.0, "deg/s": DEGREE, "rpm": 6.0 * DEGREE, "DPS": DEGREE, "RPS": 1.0},
 }
-"""SI units per unit, by quantity. G'S, KPH, MM, NWT, NWM and DPS are NHTSA's codes, m/(s*s) is ISO-MME's."""
+"""SI units per unit, by quantity. G'S, KPH, MM, NWT, NWM, DPS and others in capitals are NHTSA's codes, among them
+LBF for pound-feet and LBS for pounds; m/(s*s) is ISO-MME's."""
 
 
 def si_factor(quantity: str, unit: str) -> float:
