@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from crash_replay.recording import Recording
 
+from ...clipping import without_clipped
 from ...derived_motion import with_accelerations
 from ...effects import EFFECTS
 from ...effects.effect import Effect
@@ -99,17 +100,19 @@ def diagnose(
     """
     if not recordings:
         raise ModelError("a diagnosis needs at least one recording")
+    recordings, clipped = without_clipped(recordings)
     structure, recordings = with_accelerations(structure, recordings)
     with time_limit(seconds):
         records, zero, unused = _observed(structure, recordings, effects)
         path = first_believed(select(structure, records, effects), records)
         stopped = out_of_time()
     found = _answer(structure, path, drift_of(path.as_recorded), tolerance, zero)
+    remarks = [clipped] if clipped else []
     if unused:
-        found = replace(found, text=f"{found.text}; {signals_begin(unused)}, which would explain nothing here")
-    if not stopped:
-        return found
-    return replace(found, stopped=True, text=f"{found.text}; stopped after {seconds:g} s: not everything was tried")
+        remarks.append(f"{signals_begin(unused)}, which would explain nothing here")
+    if stopped:
+        remarks.append(f"stopped after {seconds:g} s: not everything was tried")
+    return replace(found, stopped=stopped, text="; ".join([found.text, *remarks]))
 
 
 def _observed(

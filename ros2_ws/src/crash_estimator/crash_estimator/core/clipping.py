@@ -1,0 +1,48 @@
+"""Samples at the end of a sensor's range: they say no more than that the truth lies beyond."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from crash_replay.recording import Recording
+
+from .sensor_noise import by_differences
+
+RUN = 4
+"""Samples in a row at a channel's very largest or smallest value: two such already are chance in any noise, where the
+steps of its numbers are finer than that."""
+FINER = 1e-5
+"""Of the largest value: a channel whose noise is less has none, and what is level in it may be the truth."""
+MOST = 0.5
+"""Share of the samples: of what is at its end for longer nothing else is known, and it is left as it is."""
+
+
+def clipped(values: np.ndarray) -> np.ndarray:
+    """(n,) bool: whether each of values (n,), NaN where not valid, is one of RUN or more in a row at their extreme."""
+    found = np.zeros(len(values), dtype=bool)
+    valid = np.isfinite(values)
+    if np.count_nonzero(valid) < 2 * RUN:
+        return found
+    for extreme in (np.nanmax(values), np.nanmin(values)):
+        edges = np.diff((values == extreme).astype(int), prepend=0, append=0)
+        for start, stop in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+            found[start:stop] |= stop - start >= RUN
+    noise = by_differences(values[valid & ~found]) if np.count_nonzero(valid & ~found) >= 2 * RUN else 0.0
+    believed = noise > FINER * np.nanmax(np.abs(values)) and found.mean() < MOST
+    return found if believed else np.zeros(len(values), dtype=bool)
+
+
+def without_clipped(recordings: Sequence[Recording]) -> tuple[list[Recording], str]:
+    """With holes where an acceleration or a force is clipped, and a line that says so; "" where none is."""
+    found, said = [], []
+    for recording in recordings:
+        values = recording.values.copy()
+        for k, channel in enumerate(recording.test.channels):
+            lost = clipped(values[:, k]) if channel.quantity in ("acceleration", "force") else np.zeros(0, dtype=bool)
+            if lost.any():
+                values[lost, k] = np.nan
+                said.append(
+                    f"{channel.name} of {recording.test.id} is clipped, {np.count_nonzero(lost)} samples left out"
+                )
+        found.append(Recording(recording.test, recording.time_ns, values))
+    return found, "; ".join(said)

@@ -1,0 +1,71 @@
+"""A channel at the end of its range: what it hides is not taken for what happened."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers_paths import BAGS
+
+from crash_estimator.core.clipping import clipped
+from crash_estimator.core.diagnosis import diagnose
+from crash_estimator.model_file import load_model
+from crash_replay.bag import read_bag
+from crash_replay.recording import Recording
+
+
+def at_most(recording: Recording, channel: str, share: float) -> Recording:
+    """As a sensor records it whose range ends at a share of what happened."""
+    k = recording.test.index(channel)
+    values = recording.values.copy()
+    end = share * np.nanmax(np.abs(values[:, k]))
+    values[:, k] = np.clip(values[:, k], -end, end)
+    return Recording(recording.test, recording.time_ns, values)
+
+
+@pytest.fixture(scope="module")
+def padded():
+    return read_bag(BAGS / "side_dummy_padded.mcap")
+
+
+def test_what_is_clipped_is_found_and_nothing_else(padded):
+    values = padded.column("rib_ay")
+    end = 0.6 * np.nanmax(np.abs(values))
+    lost = clipped(np.clip(values, -end, end))
+    beyond = np.abs(values) >= end
+    assert lost.any() and not (lost & ~beyond).any()
+    assert np.count_nonzero(lost) > 0.8 * np.count_nonzero(beyond), "but for lone samples of the noise"
+    assert not any(clipped(column).any() for column in padded.values.T)
+
+
+def test_holes_numbers_of_coarse_steps_and_what_has_no_noise_are_not_clipped():
+    time = np.arange(2000) * 1e-4
+    rng = np.random.default_rng(4)
+    pulse = 300.0 * np.sin(np.pi * np.clip(time / 0.1, 0.0, 1.0))
+    level = np.minimum(pulse, 150.0)
+    assert not clipped(level).any(), "without noise a level may be the truth: a force limiter's"
+    noisy = pulse + rng.normal(0.0, 1.0, len(time))
+    assert not clipped(np.round(noisy / 0.3) * 0.3).any()
+    noisy[500:600] = np.nan
+    assert not clipped(noisy).any() and not clipped(np.full(50, np.nan)).any() and not clipped(noisy[:3]).any()
+
+
+def test_a_right_model_of_a_clipped_recording_is_adequate(padded):
+    found = diagnose(load_model("side_dummy"), [at_most(padded, "rib_ay", 0.7)])
+    assert found.verdict == "adequate" and "rib_ay of side_dummy_padded is clipped" in found.text, found.text
+
+
+def test_a_missing_effect_is_found_with_a_clipped_channel():
+    model = load_model(BAGS / "hidden_effect.model.yaml")
+    recording = read_bag(BAGS / "hidden_effect.mcap")
+    (expected,) = diagnose(model, [recording]).steps
+    found = diagnose(model, [at_most(recording, "rib_ay", 0.7)])
+    (step,) = found.steps
+    assert (found.verdict, step.effect, step.target) == ("effect_missing", expected.effect, expected.target)
+    assert abs(step.coefficient - expected.coefficient) < 2.0 * expected.std
+
+
+def test_the_recording_that_was_given_stays_as_it_is(padded):
+    given = at_most(padded, "rib_ay", 0.7)
+    before = given.values.copy()
+    diagnose(replace(load_model("side_dummy")), [given])
+    np.testing.assert_array_equal(given.values, before)
