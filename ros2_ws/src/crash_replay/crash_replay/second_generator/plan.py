@@ -33,7 +33,7 @@ def plan(first_seed: int = SEEDS) -> tuple[Case, ...]:
     ways = {"one": _one(), "nothing": _nothing(), "outside": _outside(), "trouble": _trouble()}
     drawn = [case for kind, count in COUNTS.items() for case in islice(ways[kind], count)]
     order = np.random.default_rng(2).permutation(len(drawn)).tolist()
-    return tuple(Case(*drawn[k], first_seed + n) for n, k in enumerate(order))
+    return tuple(Case._make((*drawn[k], first_seed + n)) for n, k in enumerate(order))
 
 
 def kind_of(case: Case) -> str:
