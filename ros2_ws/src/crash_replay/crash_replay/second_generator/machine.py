@@ -20,8 +20,8 @@ from .joint import Held, Joint
 RELATIVE, ABSOLUTE = 1e-8, 1e-9
 """Tolerances of a step; lengths are about a metre, so that micrometres are right, and accelerations to 1e-3 g."""
 
-LONGEST = 1e-3
-"""s: the longest step, well below any event's return within a crash."""
+LONGEST = 2e-3
+"""s: the longest step, below the shortest blow here, so that no contact comes and goes within one."""
 
 MOST_EVENTS = 3000
 
