@@ -1,4 +1,4 @@
-.PHONY: help demo lint check test bags thesis benchmark benchmark-effects benchmark-outside chaos endurance fuzz clean
+.PHONY: help demo lint check test bags thesis benchmark benchmark-effects benchmark-second benchmark-outside chaos endurance fuzz clean
 
 help: # what there is to make
 	@sed -n 's/^\([a-z-]*\):.*# /make \1	/p' Makefile
@@ -44,6 +44,9 @@ benchmark: # every promised speed beside its reference, 8 minutes: docs/benchmar
 
 benchmark-effects: # which hidden effects are found, on 1500 simulated tests: docs/missing-effects.md; ARGS="--cases 20" writes out/missing-effects.md
 	@tools/env python -m crash_estimator.benchmarks.effects $(ARGS)
+
+benchmark-second: # the same on 300 tests of a second simulator: docs/second-generator.md; ARGS="--cases 20 --seed 71000000" writes to out/
+	@tools/env python -m crash_estimator.benchmarks.second $(ARGS)
 
 benchmark-outside: # what is said of recordings made elsewhere, in DATA=FOLDER, which do not come with the project: docs/outside.md
 	@tools/env python -m crash_estimator.benchmarks.outside --data "$(DATA)"

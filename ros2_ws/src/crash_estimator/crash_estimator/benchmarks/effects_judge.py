@@ -45,10 +45,11 @@ def judge(case: Case) -> dict:
             "error": f"{type(error).__name__}: {error}",
             "seconds": process_time() - start,
         }
-    return row | {"seconds": process_time() - start} | _answer(found)
+    return row | {"seconds": process_time() - start} | answer(found)
 
 
-def _answer(found: Diagnosis) -> dict:
+def answer(found: Diagnosis) -> dict:
+    """What a row keeps of it."""
     rms = found.residual_rms
     return {
         "verdict": found.verdict,

@@ -26,23 +26,28 @@ def code() -> str:
 
     The online diagnosis judges no case: it ends in the same search.
     """
-    folders = [Path(package.__file__).parent for package in (diagnosis, effects, hidden)]
+    return fingerprint(effects_judge, diagnosis, effects, hidden)
+
+
+def fingerprint(judge, *packages) -> str:
+    """Of a module that judges, and of the packages that it asks and draws from."""
+    folders = [Path(package.__file__).parent for package in packages]
     paths = [path for folder in folders for path in sorted(folder.rglob("*.py")) if path.parent.name != "online"]
     digest = sha256()
-    for path in (Path(effects_judge.__file__), *paths):
+    for path in (Path(judge.__file__), *paths):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
 
 
-def read(path: Path) -> dict[str, dict]:
-    """Case -> row, of this code; a last row that was cut off is left out."""
+def read(path: Path, mark: str = "") -> dict[str, dict]:
+    """Case -> row, of this code, or of that whose fingerprint is `mark`; a last row that was cut off is left out."""
     rows = {}
     for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
         try:
             row = json.loads(line)
         except json.JSONDecodeError:
             continue
-        if row.get("code") == code():
+        if row.get("code") == (mark or code()):
             rows[row["case"]] = row
     return rows
 
@@ -61,11 +66,11 @@ def judged(cases: Iterable[Case], processes: int) -> Iterator[dict]:
     yield from in_processes(judge, list(cases), processes)
 
 
-def in_processes(function: Callable[[Case], dict], cases: list[Case], processes: int) -> Iterator[dict]:
-    """Fresh processes: each reads its number of threads as it starts."""
-    mark = {"code": code()}
+def in_processes(function: Callable[..., dict], cases: list, processes: int, mark: str = "") -> Iterator[dict]:
+    """Fresh processes: each reads its number of threads as it starts. Rows are marked with the code's fingerprint."""
+    mark = mark or code()
     with held():
         pool = get_context("spawn").Pool(processes, initializer=begin)
     with pool:
         for row in pool.imap_unordered(function, cases):
-            yield row | mark
+            yield row | {"code": mark}
