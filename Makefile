@@ -10,6 +10,10 @@ demo: # a crash replayed, what its model lacks named, added and shown in Rerun; 
 # Without autoload: the plugins of an installed ROS 2 are written for an older pytest.
 PYTEST = PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 tools/env python -m pytest -p _hypothesis_pytestplugin -p xdist.plugin
 
+# One that is lost, as by the time limit of pyproject.toml, ends the run with the test's name: xdist would wait for ever
+# for what another one in its place has not been told of.
+TWO = -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
+
 lint: # style and types: ruff and mypy with the settings of pyproject.toml
 	@tools/env python -m ruff check --quiet .
 	@tools/env python -m ruff format --check --quiet .
@@ -22,14 +26,14 @@ CHECKED = $(patsubst %,tests/core/test_%.py,discretize effects estimators factor
 	tests/commands/test_diagnose_command.py tests/project/test_architecture.py tests/project/test_package_xml.py
 
 check: lint # for every save: style, types, and the tests that need no ROS graph, no other process and little time
-	@$(PYTEST) -n 2 --dist loadfile -q --no-graph $(CHECKED)
+	@$(PYTEST) $(TWO) -q --no-graph $(CHECKED)
 
-# A file's tests are run by one of two processes; -n 0 in PYTEST_ARGS: all by one. What is compiled is so once, before.
-# A process that dies ends the run and names its test: pytest-xdist 3.8 waits for ever for one that it starts instead.
+# A file's tests are run by one of two processes, the longest files first (tests/conftest.py); -n 0 in PYTEST_ARGS: all
+# by one. What is compiled is so once, before.
 test: lint # all tests, style and types first; some of them with PYTEST_ARGS="-k name"
 	@tools/screenshot-libs
 	@tools/env python -m crash_estimator.warm_up
-	@$(PYTEST) -n 2 --dist loadfile --max-worker-restart 0 $(PYTEST_ARGS)
+	@$(PYTEST) $(TWO) $(PYTEST_ARGS)
 
 bags: # the simulated recordings in bags/, made anew
 	@tools/run crash_replay synthesize --all --to bags

@@ -5,6 +5,7 @@ The imports are in the fixtures: what needs neither ROS nor the viewer does not 
 
 import re
 import signal
+from collections import Counter
 
 import pytest
 from hypothesis import settings
@@ -33,6 +34,17 @@ def pytest_ignore_collect(collection_path, config):
     if config.getoption("--no-graph") and collection_path.suffix == ".py":
         return True if NEEDS_A_GRAPH.search(collection_path.read_text()) else None
     return None
+
+
+LONGEST = ("test_demo.py", "test_thesis.py", "test_coverage.py", "test_demo_search.py", "test_readme_demo.py")
+"""Files of tests that take a minute or more, to be begun first: one that is begun last is waited for alone."""
+
+
+def pytest_collection_modifyitems(items):
+    """Files of many tests come next: of two processes that share them out neither waits long for the other."""
+    files = Counter(item.path for item in items)
+    rank = {path: LONGEST.index(path.name) if path.name in LONGEST else len(LONGEST) for path in files}
+    items.sort(key=lambda item: (rank[item.path], -files[item.path]))
 
 
 @pytest.fixture

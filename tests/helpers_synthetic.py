@@ -15,14 +15,15 @@ bundled = cache(lambda name: SCENARIOS[name]())
 
 
 @cache
-def drawn(structure: str, *effects: str, seed: int = SEED, size: float = 1.0) -> HiddenCase:
-    return draw_case(structure, effects, seed, size)
+def drawn(structure: str, *effects: str, seed: int = SEED, size: float = 1.0, at: str = "") -> HiddenCase:
+    """at: the target of the only effect, where it is not to be drawn."""
+    return draw_case(structure, effects, seed, size, dict.fromkeys(effects, at) if at else None)
 
 
 @cache
-def recorded(structure: str, *effects: str):
+def recorded(structure: str, *effects: str, at: str = ""):
     """-> recording and truth at 1.1 of the nominal speed, and the truth file read back."""
-    case = drawn(structure, *effects)
+    case = drawn(structure, *effects, at=at)
     recording, truth = case.record(1.1)
     return recording, truth, YAML(typ="safe", pure=True).load(case.truth_text(truth))
 

@@ -1,5 +1,7 @@
 """The compiled recursion against the readable one, at every sample."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -32,13 +34,24 @@ CASES = [
 ]
 
 
-def both(name, model, method, **settings):
-    """-> the readable form's estimates, the compiled one's, its estimator and the recording (its first 60 ms)."""
+@cache
+def disturbed(name) -> Recording:
+    """The first 60 ms."""
     recording, _ = SCENARIOS[name](3)
     keep = recording.time_ns < 60_000_000
     values = recording.values[keep].copy()
     values[700:710, 0] = np.nan  # a dropout on the way
-    recording = Recording(recording.test, recording.time_ns[keep], values)
+    return Recording(recording.test, recording.time_ns[keep], values)
+
+
+def compiled_form(name, model, method):
+    return make_estimator(load_model(model), disturbed(name).test, method, compiled=True)
+
+
+@cache
+def both(name, model, method, **settings):
+    """-> the readable form's estimates, the compiled one's, its estimator and the recording."""
+    recording = disturbed(name)
     readable, compiled = (
         make_estimator(load_model(model), recording.test, method, compiled=c, **settings) for c in (False, True)
     )
@@ -76,7 +89,7 @@ def test_a_block_is_its_samples_one_by_one(method):
 
 
 def test_the_views_are_those_of_the_layout():
-    _, _, estimator, _ = both("frontal_single", "frontal_single", "mrls")
+    estimator = compiled_form("frontal_single", "frontal_single", "mrls")
     for fields, make, views in (
         (state_fields(estimator.size), state_views, StateViews),
         (row_fields(estimator.size), row_views, RowViews),
@@ -90,7 +103,7 @@ def test_the_views_are_those_of_the_layout():
 
 @pytest.mark.parametrize("method", ["mrls", "constrained_kalman"])
 def test_a_plan_comes_back_from_its_two_arrays(method):
-    _, _, estimator, _ = both("frontal_engine_cab", "frontal_engine_cab", method)
+    estimator = compiled_form("frontal_engine_cab", "frontal_engine_cab", method)
     settings = make_method_plan(estimator.method)
     whole, others = flat(estimator.size, settings, estimator.plan)
     assert size_of(whole) == estimator.size

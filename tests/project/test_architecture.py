@@ -50,6 +50,20 @@ def test_help_needs_nothing_that_takes_long_to_import(name):
     assert module in loaded and not loaded & HEAVY
 
 
+@pytest.mark.parametrize(
+    "module, needless",
+    [
+        ("crash_estimator.demo.run", {"numba", "rerun", "scipy.special"}),
+        ("crash_estimator.nodes.viewer_node", {"numba", "scipy.special"}),
+        ("crash_estimator.nodes.diagnosis_answerer", {"scipy.signal", "scipy.stats", "scipy.interpolate", "rclpy"}),
+    ],
+)
+def test_a_process_starts_without_what_it_has_no_use_for(module, needless):
+    """Each of these takes as long to import as all the rest, in every process and every test that starts one."""
+    loaded = modules_after(f"import {module}")
+    assert module in loaded and not loaded & needless
+
+
 EXAMPLE = "air_bag_trigger.py"
 """Written as by another author, who has none of our Python."""
 

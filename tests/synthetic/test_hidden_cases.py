@@ -52,7 +52,7 @@ def test_size_scales_the_effect_and_nothing_else():
 
 
 def test_two_effects_are_hidden_at_once_on_two_targets():
-    case = drawn("dummy", "viscous_damping", "channel_gain")
+    case = drawn("frontal", "viscous_damping", "channel_gain")  # nothing is driven there: soon drawn
     assert [h.effect for h in case.hidden] == ["viscous_damping", "channel_gain"]
     assert len({h.target for h in case.hidden}) == 2
 
@@ -107,7 +107,10 @@ def test_a_driven_channel_is_wrong_only_where_what_it_drives_shows_it():
     between them takes in does not show, either: told what the curves are, it does."""
     bare = draw_case("dummy", (), 3).specimen
     beside_the_car = [e.name for e in bare.scenario.system.elements if "car" in e.between]
-    loose, known = bare, {name: entry | {"stiffness": 1e5} for name, entry in bare.model["elements"].items()}
+    known = {name: entry | {"stiffness": 1e5} for name, entry in bare.model["elements"].items()}
+    free = {name: entry for name, entry in bare.model["elements"].items() if name in beside_the_car}
+    bare = replace(bare, model={**bare.model, "elements": known | free})  # no other curve, nor what it could take in
+    loose = bare
     for name in beside_the_car:
         loose = loose.with_law(name, curve=straight(1.0), damping=0.0)
     assert all(bare.told(name) == "curve" for name in beside_the_car)

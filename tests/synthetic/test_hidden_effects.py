@@ -86,10 +86,15 @@ def test_body_feels_the_hidden_effect(structure, effect):
             assert_allclose(grown[-50:][np.isfinite(grown[-50:])], c, rtol=1e-9)
 
 
+NOT_DRIVEN = {("dummy", effect): {"at": "rib_ay"} for effect in ("channel_gain", "channel_offset")}
+"""Where a driven channel would be drawn, of which it takes 90 simulations to know whether its error shows: a delay's
+does for all three, and they err alike wherever they are."""
+
+
 @pytest.mark.parametrize("structure", ["frontal", "side", "dummy"])
 @pytest.mark.parametrize("effect", ["channel_delay", "channel_gain", "channel_offset", "rotation"])
 def test_sensor_errs_as_hidden(structure, effect):
-    recording, truth, content = recorded(structure, effect)
+    recording, truth, content = recorded(structure, effect, **NOT_DRIVEN.get((structure, effect), {}))
     (hidden,) = content["hidden"]
     name = hidden["target"] if effect != "rotation" else f"{hidden['target']}_a{recording.test.channels[0].axis}"
     sensor = next(s for s in truth.scenario.sensors if s.channel.name == name)

@@ -21,7 +21,7 @@ from crash_estimator.viewer.readable import plots, time_range, value_range
 from crash_estimator.viewer.schematic import schematic
 from crash_estimator.viewer.shapes import force_colors, force_scale
 from crash_estimator.viewer.states import States
-from crash_estimator.viewer.summary import with_std
+from crash_estimator.viewer.units import with_std
 
 
 def test_blocks_are_joined_by_estimator_kind_and_run(streams):

@@ -4,13 +4,11 @@ The derivative is that of a local polynomial (Savitzky and Golay 1964), over the
 channel to within its noise. It looks ahead: nothing here serves a node that follows sample by sample.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.signal import savgol_filter
 
 from crash_replay.recording import Channel, Recording
 
@@ -83,6 +81,8 @@ def _with_acceleration(recording: Recording, body: Body, name: str) -> Recording
 
 def smoothed(values: np.ndarray, period: float) -> Smoothed:
     """Of values (n,) on an even grid of `period` s."""
+    from scipy.signal import savgol_filter  # it takes longer to import than all the rest: few models need it
+
     best = WINDOWS[0]
     if len(values) < best:
         nothing = np.full_like(values, np.nan)
@@ -99,12 +99,14 @@ def smoothed(values: np.ndarray, period: float) -> Smoothed:
     return Smoothed(*(savgol_filter(values, best, ORDER, deriv=k, delta=period) for k in range(3)))
 
 
-def between_samples(time: np.ndarray, values: np.ndarray) -> CubicSpline:
+def between_samples(time: np.ndarray, values: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     """A measured force (n,) as a function of the time in s: what oscillates with few samples a period keeps its size.
 
     A straight line between samples would take 4 % off what has nine of them a period. Raises ModelError where fewer
     than two are valid.
     """
+    from scipy.interpolate import CubicSpline  # late, as above
+
     valid = np.isfinite(values)
     if np.count_nonzero(valid) < 2:
         raise ModelError("a force that is applied to a body needs two valid samples at least")

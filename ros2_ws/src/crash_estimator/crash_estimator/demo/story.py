@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 
 from ..viewer.findings import EFFECT_MISSING, FOUND, Candidate, MisfitBlock, RankingBlock, Window
-from ..viewer.summary import with_std
-from ..viewer.units import shown
+from ..viewer.units import shown, with_std
 
 SURE = 3
 """Rankings in a row that a candidate leads before it is worth a line."""

@@ -3,14 +3,16 @@ they are, or from `Estimate`s."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isfinite, isqrt
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..core.compiled.estimator import CompiledEstimator, CompiledState
 from ..core.estimate import Estimate, Event, ParameterStatus
 from ..core.methods import AnyEstimator
 from ..kept import Rows
+
+if TYPE_CHECKING:  # who only reads estimates has no use for numba, which takes half a second to import
+    from ..core.compiled.estimator import CompiledEstimator, CompiledState
 
 FIELDS = (
     *("covariance", "status", "measured", "predicted", "innovation", "residual", "residual_std"),
@@ -46,8 +48,8 @@ class Again(NamedTuple):
     more for the forces alone, takes a compiled recursion 5 % of its time.
     """
 
-    estimator: CompiledEstimator
-    state: CompiledState  # before the block
+    estimator: "CompiledEstimator"
+    state: "CompiledState"  # before the block
     rows: Rows  # views of what is kept
 
     @property
@@ -73,6 +75,8 @@ def follow(estimator: AnyEstimator, state: Any, rows: Rows) -> tuple[Any, Column
 
     However the samples are shared out to calls, states and estimates are the same to the last bit.
     """
+    from ..core.compiled.estimator import CompiledEstimator  # late, see above
+
     if isinstance(estimator, CompiledEstimator):
         return _follow_compiled(estimator, state, rows)
     estimates: list[Estimate] = []
@@ -103,7 +107,9 @@ def columns_of(estimates: Sequence[Estimate]) -> Columns:
     return Columns(estimates[0].number, np.array([e.time_ns for e in estimates]), of, events)
 
 
-def _follow_compiled(estimator: CompiledEstimator, state: CompiledState, rows: Rows) -> tuple[CompiledState, Columns]:
+def _follow_compiled(
+    estimator: "CompiledEstimator", state: "CompiledState", rows: Rows
+) -> tuple["CompiledState", Columns]:
     after, table = estimator.follow(state, rows.time_ns, rows.values)
     value = table[:, estimator.columns["parameters"]]
     if not isfinite(value[-1].sum()):  # what is not finite once stays so
@@ -114,7 +120,7 @@ def _follow_compiled(estimator: CompiledEstimator, state: CompiledState, rows: R
     return after, _columns(estimator, state, rows, table)
 
 
-def _columns(estimator: CompiledEstimator, state: CompiledState, rows: Rows, table: np.ndarray) -> Columns:
+def _columns(estimator: "CompiledEstimator", state: "CompiledState", rows: Rows, table: np.ndarray) -> Columns:
     events = [
         (k, event)
         for k in np.flatnonzero(table[:, estimator.columns["news"]]).tolist()

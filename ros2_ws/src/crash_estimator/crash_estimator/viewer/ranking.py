@@ -22,8 +22,7 @@ from .colors import (
 from .drawing import Drawing, Frame, view
 from .findings import FOUND, Candidate, RankingBlock
 from .states import STATES
-from .summary import with_std
-from .units import Shown
+from .units import Shown, with_std
 
 CANDIDATES = 6
 REVISIONS = 5

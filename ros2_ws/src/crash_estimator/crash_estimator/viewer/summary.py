@@ -1,7 +1,5 @@
 """A table of errors and parameters that is kept up to date."""
 
-import math
-
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
@@ -12,6 +10,7 @@ from .blocks import ParameterBlock, ResidualBlock
 from .cast import Cast
 from .noise import NoiseFloor
 from .pen import Pen
+from .units import with_std
 
 Key = tuple[str, str]  # (estimator, equation or parameter)
 
@@ -82,14 +81,6 @@ class Summary:
             return "–"
         value, std = (factor * x for x in self.parameters[name, parameter])
         return with_std(value, std)
-
-
-def with_std(value: float, std: float) -> str:
-    """Both to the first digit of the standard deviation, such as 1540 ± 20."""
-    if not (std > 0 and math.isfinite(std)):
-        return f"{value:.4g}"
-    digits = -math.floor(math.log10(std))
-    return f"{round(value, digits):.{max(digits, 0)}f} ± {round(std, digits):.{max(digits, 0)}f}"
 
 
 def row(title: str, cells: list[str]) -> str:

@@ -1,5 +1,6 @@
 """SI inside, a crash engineer's units on the screen: g, kN (N for light bodies), mm, N/mm (= kN/m)."""
 
+import math
 from typing import NamedTuple
 
 
@@ -26,3 +27,11 @@ def shown(si_unit: str, light: bool = False) -> Shown:
     if light and si_unit == "N":
         return Shown("N", 1.0)
     return _SHOWN.get(si_unit, Shown(si_unit, 1.0))
+
+
+def with_std(value: float, std: float) -> str:
+    """Both to the first digit of the standard deviation, such as 1540 ± 20."""
+    if not (std > 0 and math.isfinite(std)):
+        return f"{value:.4g}"
+    digits = -math.floor(math.log10(std))
+    return f"{round(value, digits):.{max(digits, 0)}f} ± {round(std, digits):.{max(digits, 0)}f}"

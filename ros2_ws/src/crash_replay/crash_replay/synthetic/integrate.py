@@ -54,7 +54,7 @@ class _Equations:
         self.pushed = np.stack(pushed, axis=1).tolist()
         self.links = [(a, b, element.force) for (a, b), element in zip(system.ends(), system.elements)]
         self.slips = [element.slips if element.slip else None for element in system.elements]
-        self.remembers = any(self.slips)
+        self.remembers, self.nothing = any(self.slips), [0.0] * len(self.links)
 
     def crush(self, x: list[float]) -> list[float]:
         return [x[a] - x[b] for a, b, _ in self.links]
@@ -67,9 +67,10 @@ class _Equations:
         each = zip(self.links, self.largest(peak, x), slipped)
         return [law(x[a] - x[b], v[a] - v[b], p, s) for (a, b, law), p, s in each]
 
-    def flows(self, state: State) -> list[float]:
+    def flow(self, x: list[float], v: list[float], slipped: list[float]) -> list[float]:
         """(e,) 1/s, of what the slips remember."""
-        x, v, _, slipped = state
+        if not self.remembers:
+            return self.nothing
         each = zip(self.links, self.slips, slipped)
         return [slips(x[a] - x[b], v[a] - v[b], s) if slips else 0.0 for (a, b, _), slips, s in each]
 
@@ -80,8 +81,15 @@ class _Equations:
             loads[b] += force
         return loads
 
-    def accelerations(self, node: int, state: State) -> list[float]:
-        loads = self.loads(self.forces(state))
+    def acceleration(
+        self, node: int, x: list[float], v: list[float], peak: list[float], slipped: list[float]
+    ) -> list[float]:
+        loads = [0.0] * self.bodies
+        for (a, b, law), largest, s in zip(self.links, peak, slipped):
+            crush = x[a] - x[b]
+            force = law(crush, v[a] - v[b], crush if crush > largest else largest, s)
+            loads[a] -= force
+            loads[b] += force
         columns = zip(loads, self.pushed[node], self.masses[node], self.driven[node])
         return [(load + push) / mass if mass else given for load, push, mass, given in columns]
 
@@ -106,26 +114,20 @@ def simulate(system: System, time: np.ndarray, max_step: float = MAX_STEP) -> Hi
 
 
 def _step(equations: _Equations, node: int, state: State, h: float) -> State:
-    """One step h (s) from the grid's `node` to node + 2."""
-    x, v, peak, slipped = state
-
-    def slope(at: State, of: int) -> State:
-        """(velocities, accelerations, -, flows) there."""
-        flows = equations.flows(at) if equations.remembers else slipped
-        return State(at.v, equations.accelerations(of, at), peak, flows)
-
-    def ahead(step: float, by: State) -> State:
-        flowed = _moved(slipped, step, by.slipped) if equations.remembers else slipped
-        return State(_moved(x, step, by.x), _moved(v, step, by.v), peak, flowed)
-
-    k1 = slope(state, node)
-    k2 = slope(ahead(0.5 * h, k1), node + 1)
-    k3 = slope(ahead(0.5 * h, k2), node + 1)
-    k4 = slope(ahead(h, k3), node + 2)
-    mean = State(*(_weighted(*each) for each in zip(k1, k2, k3, k4)))
-    end = ahead(h / 6.0, mean)
-    bounded = [min(max(s, -1.0), 1.0) for s in end.slipped] if equations.remembers else slipped
-    return State(end.x, end.v, equations.largest(peak, end.x), bounded)
+    """One step h (s) from the grid's `node` to node + 2; written out, for it is most of what a simulation takes."""
+    x, v, peak, s = state
+    acceleration, flow, half, sixth = equations.acceleration, equations.flow, 0.5 * h, h / 6.0
+    a1, f1 = acceleration(node, x, v, peak, s), flow(x, v, s)
+    x2, v2, s2 = _moved(x, half, v), _moved(v, half, a1), _moved(s, half, f1)
+    a2, f2 = acceleration(node + 1, x2, v2, peak, s2), flow(x2, v2, s2)
+    x3, v3, s3 = _moved(x, half, v2), _moved(v, half, a2), _moved(s, half, f2)
+    a3, f3 = acceleration(node + 1, x3, v3, peak, s3), flow(x3, v3, s3)
+    x4, v4, s4 = _moved(x, h, v3), _moved(v, h, a3), _moved(s, h, f3)
+    a4, f4 = acceleration(node + 2, x4, v4, peak, s4), flow(x4, v4, s4)
+    x_end, v_end = _moved(x, sixth, _weighted(v, v2, v3, v4)), _moved(v, sixth, _weighted(a1, a2, a3, a4))
+    if equations.remembers:
+        s = [min(max(slipped, -1.0), 1.0) for slipped in _moved(s, sixth, _weighted(f1, f2, f3, f4))]
+    return State(x_end, v_end, equations.largest(peak, x_end), s)
 
 
 def _moved(start: list[float], h: float, slope: list[float]) -> list[float]:
@@ -143,7 +145,7 @@ def _history(equations: _Equations, time: np.ndarray, nodes: list[int], states: 
         time=time,
         displacement=x,
         velocity=v,
-        acceleration=np.array([equations.accelerations(node, state) for node, state in zip(nodes, states)]),
+        acceleration=np.array([equations.acceleration(node, *state) for node, state in zip(nodes, states)]),
         load=np.array([equations.loads(row) for row in force.tolist()]),
         crush=np.array([equations.crush(state.x) for state in states]),
         rate=np.array([equations.crush(state.v) for state in states]),

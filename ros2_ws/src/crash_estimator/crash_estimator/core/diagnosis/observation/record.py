@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from crash_replay.recording import SI_UNIT, Recording, Test
 
@@ -163,6 +162,8 @@ def observe(structure: Structure, recording: Recording) -> ObservedRecord:
             force = between_samples(recording.time, recording.column(body.applied))
             signals[body.applied] = signals[body.applied]._replace(on_grid=force(time))
         if body.derived and body.displacement:
+            from scipy.interpolate import CubicSpline  # late: few models have such a body
+
             name, x = body.acceleration[0], signals[body.displacement]
             path = CubicSpline(x.time, smoothed(x.values, recording.sample_period).value)
             signals[name] = signals[name]._replace(on_grid=tracked_acceleration(time, path, *start[:, k]))

@@ -5,9 +5,10 @@ A derivative integrated twice drifts off, by metres over ten seconds. So it is c
     a = x_m'' + r^2 (x_m - x) + 2 r (x_m' - v)
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from numba import njit
-from scipy.interpolate import CubicSpline
 
 from ... import compile_cache as _compile_cache  # noqa: F401  before any compiled function is defined
 
@@ -15,8 +16,9 @@ OF_STEP = 0.2
 """Of one over a step: fast, and slow enough that a step does not overshoot; only a start, which the fit corrects."""
 
 
-def tracked_acceleration(time: np.ndarray, displacement: CubicSpline, x0: float, v0: float) -> np.ndarray:
-    """(g,) m/s^2 at the instants of a record, of a displacement in m as a function of the time in s.
+def tracked_acceleration(time: np.ndarray, displacement: Callable[..., np.ndarray], x0: float, v0: float) -> np.ndarray:
+    """(g,) m/s^2 at the instants of a record, of a displacement in m as a function of the time in s, which
+    gives its n-th derivative for a second argument n.
 
     x0, v0: m and m/s from which it will be integrated.
     """
