@@ -3,6 +3,8 @@
 import pytest
 from helpers_paths import BAGS
 
+from crash_estimator.benchmarks.effects_judge import drawn
+from crash_estimator.benchmarks.effects_plan import case_of
 from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.model_file import load_model
 from crash_replay.bag import read_bag
@@ -69,13 +71,21 @@ def test_a_right_model_of_a_test_with_a_wrong_time_zero_is_not_adequate(padded):
     assert found.ranking[0].effect == "time_zero" and found.structure.effects == ()
 
 
-def test_a_time_zero_that_makes_no_difference_is_told_all_the_same(padded):
-    """Driven bodies move later: nothing happens before."""
+def test_a_time_zero_stated_early_is_told_and_left_to_a_gap_or_a_delay(padded):
+    """Driven bodies move later: it makes no difference to them."""
     found = diagnose(load_model("side_dummy"), [shifted(padded, -3.0)])
     assert found.verdict == "adequate" and "the signals begin +3.1 ms (side_dummy_padded)" in found.text, found.text
 
 
-def test_several_recordings_are_moved_each_by_its_own(model, recording):
-    found = diagnose(model, [shifted(recording, 2.0), shifted(recording, 4.0)])
-    assert found.steps[0].effect == "time_zero" and found.steps[1].effect == "coulomb_friction"
-    assert abs(found.steps[0].coefficient + 4e-3) < 2.5 * recording.sample_period
+def test_several_recordings_are_moved_each_by_its_own(padded):
+    found = diagnose(load_model("side_dummy"), [shifted(padded, 4.0), shifted(padded, 5.0)])
+    (zero,) = found.steps
+    assert (found.verdict, found.complete, zero.effect) == ("effect_missing", True, "time_zero")
+    assert abs(zero.coefficient + 5e-3) < 2.5 * padded.sample_period
+
+
+def test_a_gap_that_closes_is_no_wrong_time_zero():
+    _, structure, recordings = drawn(case_of("side/clearance/1/1g/10000Hz/0.75,1.1/5000000"))
+    found = diagnose(structure, recordings)
+    (step,) = found.steps
+    assert (found.verdict, step.effect) == ("effect_missing", "clearance") and "the signals begin +" in found.text

@@ -21,7 +21,7 @@ from ..selection.fitted_model import Model
 from ..selection.selection_step import fit_of_all
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_limit import out_of_time, time_limit
-from ..selection.time_zero import Shift, TimeZero, from_their_onset, time_zero_wrong
+from ..selection.time_zero import Shift, TimeZero, moved_by, onsets_elsewhere, time_zero_wrong
 from .left import Left, band_of, left_by
 from .model_effects import structure_with
 from .ranking import Ranked, StepReport, ranking_of, step_of
@@ -109,7 +109,7 @@ def diagnose(
     found = _answer(structure, path, drift_of(path.as_recorded), tolerance, zero)
     remarks = [clipped] if clipped else []
     if unused:
-        remarks.append(f"{signals_begin(unused)}, which would explain nothing here")
+        remarks.append(signals_begin({shift.test: shift.seconds for shift in unused}))
     if stopped:
         remarks.append(f"stopped after {seconds:g} s: not everything was tried")
     return replace(found, stopped=stopped, text="; ".join([found.text, *remarks]))
@@ -118,19 +118,20 @@ def diagnose(
 def _observed(
     structure: Structure, recordings: Sequence[Recording], effects: Mapping[str, Effect]
 ) -> tuple[list[ObservedRecord], TimeZero | None, tuple[Shift, ...]]:
-    """The recordings from the time zero on that the model leaves least of: the stated one, or their onset; and onsets
-    elsewhere that make no difference to it."""
+    """The recordings from the stated time zero on, or from their onset where that comes first and the model leaves less
+    of them so; and onsets elsewhere that they are not taken from."""
 
     def observed(recordings: Sequence[Recording]) -> list[ObservedRecord]:
         return [observe(structure, at_its_own_pace(structure, recording)) for recording in recordings]
 
-    records = observed(recordings)
-    moved, shifts = from_their_onset(recordings)
-    if not shifts:
-        return records, None, ()
-    from_onset = observed(moved)
-    zero = time_zero_wrong(structure, records, from_onset, shifts, effects)
-    return (from_onset, zero, ()) if zero else (records, None, shifts)
+    records, elsewhere = observed(recordings), onsets_elsewhere(recordings)
+    early = tuple(shift for shift in elsewhere if shift.seconds < 0.0)
+    if early:
+        from_onset = observed(moved_by(early, recordings))
+        zero = time_zero_wrong(structure, records, from_onset, early, effects)
+        if zero:
+            return from_onset, zero, tuple(shift for shift in elsewhere if shift not in early)
+    return records, None, elsewhere
 
 
 def _answer(

@@ -1,12 +1,12 @@
 """A time zero that was stated wrongly, told as the first of the steps."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from ..residuals.residuals import noise_floor
 from ..selection.fitted_model import Model
-from ..selection.time_zero import Shift, TimeZero
+from ..selection.time_zero import TimeZero
 from .ranking import Ranked, StepReport
 
 TIME_ZERO = "time_zero"
@@ -44,11 +44,7 @@ def as_ranked(step: StepReport) -> Ranked:
     return Ranked(step.effect, step.target, *numbers, told, (), step.shape)
 
 
-def shifts_of(step: StepReport) -> list[Shift]:
-    each = step.shape or {step.target: step.coefficient}
-    return [Shift(test, seconds, step.std) for test, seconds in each.items()]
-
-
-def signals_begin(shifts: Sequence[Shift]) -> str:
-    each = ", ".join(f"{1e3 * shift.seconds:+.3g} ms ({shift.test})" for shift in shifts)
+def signals_begin(tests: Mapping[str, float]) -> str:
+    """tests: s from the stated time zero to the onset, of each."""
+    each = ", ".join(f"{1e3 * seconds:+.3g} ms ({test})" for test, seconds in tests.items())
     return f"the signals begin {each} from the stated time zero"

@@ -8,7 +8,7 @@ from ..selection.fitted_model import Model
 from ..selection.thresholds import THRESHOLDS
 from .left import Left
 from .ranking import StepReport
-from .time_zero_step import TIME_ZERO, shifts_of, signals_begin
+from .time_zero_step import TIME_ZERO, signals_begin
 from .tolerance import Tolerance
 from .verdict import ADEQUATE, EFFECT_MISSING, Evidence, Verdict
 
@@ -27,7 +27,8 @@ def verdict_text(
         said = f"unexplained: {_unexplained(evidence, steps, first, final, floor)}"
     said = said if as_given else f"{said}; with contacts that never pull, not even by their dampers"
     if steps and steps[0].effect == TIME_ZERO:
-        said += f"; {signals_begin(shifts_of(steps[0]))}: `import --time-zero auto` moves it"
+        moved = steps[0].shape or {steps[0].target: steps[0].coefficient}
+        said += f"; {signals_begin(moved)}: `import --time-zero auto` moves it"
     return said
 
 

@@ -1,7 +1,8 @@
 """Whether a stated time zero is the impact's: recordings compared with the same ones from their onset on.
 
-Whoever states it reads a contact switch, a flash or a curve, and may be some ms off. A model whose bodies begin to move
-too early or too late leaves what other effects then seem to explain: a gap, a delay, a damper.
+Whoever states it reads a contact switch, a flash or a curve, and may be some ms off. Where the signals begin before it,
+no model can follow: its bodies are at rest, or coast, until then. Where they begin after it, a gap that closes says the
+same, and a delay; that is told, and left to them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,6 +26,7 @@ from .thresholds import THRESHOLDS
 class Shift(NamedTuple):
     """Of a recording's time zero."""
 
+    recording: int  # which of those that are diagnosed
     test: str
     seconds: float  # from the stated one to the onset
     std: float  # s
@@ -42,18 +44,22 @@ class TimeZero(NamedTuple):
         return float(bins * np.log(self.as_stated.residuals.rms / moved.residuals.rms))
 
 
-def from_their_onset(recordings: Sequence[Recording]) -> tuple[list[Recording], tuple[Shift, ...]]:
-    """Those whose signals begin elsewhere than at the stated time zero are moved there."""
-    moved, shifts = [], []
-    for recording in recordings:
+def onsets_elsewhere(recordings: Sequence[Recording]) -> tuple[Shift, ...]:
+    """Of the recordings whose signals begin elsewhere than at the stated time zero."""
+    shifts = []
+    for k, recording in enumerate(recordings):
         onset = find_onset(recording)
         if onset is not None and onset.differs:
             least = recording.sample_period / np.sqrt(12.0)  # an instant between two samples
             std = max(onset.precision_ns * 1e-9 / np.sqrt(AS_WELL), least)
-            shifts.append(Shift(recording.test.id, onset.time_ns * 1e-9, float(std)))
-            recording = Recording(recording.test, recording.time_ns - onset.time_ns, recording.values)
-        moved.append(recording)
-    return moved, tuple(shifts)
+            shifts.append(Shift(k, recording.test.id, onset.time_ns * 1e-9, float(std)))
+    return tuple(shifts)
+
+
+def moved_by(shifts: Sequence[Shift], recordings: Sequence[Recording]) -> list[Recording]:
+    """With time zero at their onsets."""
+    by = {shift.recording: round(shift.seconds * 1e9) for shift in shifts}
+    return [Recording(r.test, r.time_ns - by.get(k, 0), r.values) for k, r in enumerate(recordings)]
 
 
 def time_zero_wrong(
@@ -63,8 +69,7 @@ def time_zero_wrong(
     shifts: tuple[Shift, ...],
     effects: Mapping[str, Effect],
 ) -> TimeZero | None:
-    """None where the model as given leaves hardly less of the moved recordings: a body may well be hit later than at
-    time zero, over a gap."""
+    """None where the model as given leaves hardly less of the moved recordings."""
     models = []
     for records in (stated, moved):
         magnitudes = measure_magnitudes(structure, records, CELLS)
