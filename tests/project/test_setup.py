@@ -235,7 +235,9 @@ def test_the_demonstration_gets_what_its_picture_takes_where_there_is_no_screen(
     assert first.startswith('[ -n "$DISPLAY$WAYLAND_DISPLAY" ] ||') and "tools/screenshot-libs" in first
 
 
-TWO_PROCESSES = "-p _hypothesis_pytestplugin -p xdist.plugin -n 2 --dist loadfile"
+TWO_PROCESSES = (
+    "-p _hypothesis_pytestplugin -p xdist.plugin -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0"
+)
 
 
 def test_make_test_ends_with_pytest_itself():
