@@ -32,8 +32,7 @@ def test_what_is_clipped_is_found_and_nothing_else(padded):
     end = 0.6 * np.nanmax(np.abs(values))
     lost = clipped(np.clip(values, -end, end))
     beyond = np.abs(values) >= end
-    assert lost.any() and not (lost & ~beyond).any()
-    assert np.count_nonzero(lost) > 0.8 * np.count_nonzero(beyond), "but for lone samples of the noise"
+    np.testing.assert_array_equal(lost, beyond)
     assert not any(clipped(column).any() for column in padded.values.T)
 
 

@@ -5,7 +5,6 @@ import json
 import os
 import sys
 from pathlib import Path
-from time import monotonic
 
 from crash_replay.fault import guarded
 from crash_replay.output import check_outputs
@@ -15,7 +14,7 @@ from ..figures import write_markdown
 from .effects_judge import WANTED, judge, kind_of
 from .effects_page import page
 from .effects_plan import FULL, SEEDS, TWO, Case, case_of, plan
-from .effects_results import ONE_THREAD, append, code, in_processes, judged, read
+from .effects_results import ONE_THREAD, add_options, add_rows, code, in_processes, judged, read
 from .effects_time import timed
 
 TIMED = ("coulomb_friction", "viscous_damping", "plastic_unloading", "added_mass", "load_path", "unmodelled_body",
@@ -33,21 +32,8 @@ def main() -> None:
 
 def _parser() -> Parser:
     parser = Parser(prog="effects", description=__doc__.partition(": ")[2])
-    parser.add_argument(
-        "--cases", type=int, metavar="N", help="only the first N of the plan, which is mixed; default all"
-    )
-    parser.add_argument("--case", metavar="NAME", help="only this one, with its row of results, and write nothing")
-    parser.add_argument("--like", metavar="TEXT", help="only cases with this in their names, such as dummy/clearance")
+    add_options(parser, PAGE, "dummy/clearance")
     parser.add_argument("--seeds-from", type=int, default=SEEDS, metavar="N", help="below the default for development")
-    parser.add_argument(
-        "--results", type=Path, default=Path("out/missing-effects.jsonl"), help="resumed where it exists"
-    )
-    parser.add_argument(
-        "--to", type=Path, metavar="PAGE.md", help=f"default: docs/{PAGE}; of a part of the plan: out/{PAGE}"
-    )
-    parser.add_argument("--processes", type=int, default=os.cpu_count(), metavar="N")
-    parser.add_argument("--fresh", action="store_true", help="drop the results there are")
-    parser.add_argument("--page", action="store_true", help="judge nothing more, only write the page")
     return parser
 
 
@@ -70,23 +56,14 @@ def _run(arguments: argparse.Namespace) -> None:
     if not arguments.page:
         left = [c for c in cases if c.name not in done]
         say(f"{len(cases)} cases, {len(cases) - len(left)} of them in {arguments.results}")
-        _add(judged(left, arguments.processes), len(left), arguments.results, done)
+        add_rows(judged(left, arguments.processes), len(left), arguments.results, done, _outcome)
         clocked = [c for c in times if f"time {c.name}" not in done]
         if clocked:  # one after the other, with nothing beside them
-            _add(in_processes(timed, clocked, 1), len(clocked), arguments.results, done)
+            add_rows(in_processes(timed, clocked, 1), len(clocked), arguments.results, done, _outcome)
     rows = [done[c.name] for c in cases if c.name in done]
     clocked = [done[f"time {c.name}"] for c in times if f"time {c.name}" in done]
     write_markdown(to, [page(rows, clocked, len(cases), code())])
     say(f"{to}: {len(rows)} of {len(cases)} cases")
-
-
-def _add(rows, count: int, results: Path, done: dict[str, dict]) -> None:
-    start = monotonic()
-    for n, row in enumerate(rows, 1):
-        append(results, row)
-        done[row["case"]] = row
-        ahead = (monotonic() - start) / n * (count - n) / 60.0
-        say(f"{n}/{count}, {ahead:.0f} min to go: {row['case']}: {_outcome(row)}")
 
 
 def _outcome(row: dict) -> str:

@@ -1,13 +1,18 @@
-"""The file of results: one row of JSON for a case, appended as soon as it is judged, so that a run can be resumed."""
+"""A run of many cases: its options, and the file of results. A row of JSON for a case is appended as soon as that is
+judged, so that a run can be resumed."""
 
+import argparse
 import json
+import os
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from hashlib import sha256
 from multiprocessing import get_context
 from pathlib import Path
+from time import monotonic
 
 from crash_replay.output import named
+from crash_replay.said import say
 from crash_replay.starting import begin, held
 from crash_replay.synthetic import hidden
 
@@ -18,6 +23,31 @@ from .effects_plan import Case
 
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 """For every process: threads on matrices as small as these cost more than they bring."""
+
+
+def add_options(parser: argparse.ArgumentParser, page: Path, example: str) -> None:
+    """Which cases of a plan, and where to; example: a part of a case's name."""
+    parser.add_argument("--cases", type=int, metavar="N", help="only the first N of the plan, which is mixed")
+    parser.add_argument("--case", metavar="NAME", help="only this one, with its row of results, and write nothing")
+    parser.add_argument("--like", metavar="TEXT", help=f"only cases with this in their names, such as {example}")
+    results = Path("out") / page.with_suffix(".jsonl")
+    parser.add_argument("--results", type=Path, default=results, help="resumed where it exists")
+    parser.add_argument("--to", type=Path, metavar="PAGE.md", help=f"default: docs/{page}; of a part: out/{page}")
+    parser.add_argument("--processes", type=int, default=os.cpu_count(), metavar="N")
+    parser.add_argument("--fresh", action="store_true", help="drop the results there are")
+    parser.add_argument("--page", action="store_true", help="judge nothing more, only write the page")
+
+
+def add_rows(
+    rows: Iterable[dict], count: int, results: Path, done: dict[str, dict], outcome: Callable[[dict], str]
+) -> None:
+    """Take rows into `done` and the file as they come, and say each, with the time that the rest of `count` takes."""
+    start = monotonic()
+    for n, row in enumerate(rows, 1):
+        append(results, row)
+        done[row["case"]] = row
+        ahead = (monotonic() - start) / n * (count - n) / 60.0
+        say(f"{n}/{count}, {ahead:.0f} min to go: {row['case']}: {outcome(row)}")
 
 
 @cache

@@ -6,7 +6,6 @@ import json
 import os
 import sys
 from pathlib import Path
-from time import monotonic
 
 from crash_replay import second_generator
 from crash_replay.fault import guarded
@@ -18,7 +17,7 @@ from crash_replay.second_generator.plan import SEEDS, plan
 from ..core import diagnosis, effects
 from ..figures import write_markdown
 from . import second_judge
-from .effects_results import ONE_THREAD, append, fingerprint, in_processes, read
+from .effects_results import ONE_THREAD, add_options, add_rows, fingerprint, in_processes, read
 from .second_judge import judge, wanted
 from .second_page import page
 
@@ -32,19 +31,8 @@ def main() -> None:
 
 def _parser() -> Parser:
     parser = Parser(prog="second", description=__doc__.partition(": ")[2])
-    parser.add_argument("--cases", type=int, metavar="N", help="only the first N of the plan, which is mixed")
-    parser.add_argument("--case", metavar="NAME", help="only this one, with its row of results, and write nothing")
-    parser.add_argument("--like", metavar="TEXT", help="only cases with this in their names, such as side/friction")
+    add_options(parser, PAGE, "side/friction")
     parser.add_argument("--seed", type=int, default=SEEDS, metavar="N", help="the first; not the default: development")
-    parser.add_argument(
-        "--results", type=Path, default=Path("out/second-generator.jsonl"), help="resumed where it exists"
-    )
-    parser.add_argument(
-        "--to", type=Path, metavar="PAGE.md", help=f"default: docs/{PAGE}; of a part, or with --seed: out/"
-    )
-    parser.add_argument("--processes", type=int, default=os.cpu_count(), metavar="N")
-    parser.add_argument("--fresh", action="store_true", help="drop the results there are")
-    parser.add_argument("--page", action="store_true", help="judge nothing more, only write the page")
     return parser
 
 
@@ -66,12 +54,8 @@ def _run(arguments: argparse.Namespace) -> None:
     done = read(arguments.results, mark)
     left = [] if arguments.page else [case for case in cases if case.name not in done]
     say(f"{len(cases)} cases, {sum(case.name in done for case in cases)} of them in {arguments.results}")
-    start = monotonic()
-    for n, row in enumerate(in_processes(judge, left, arguments.processes, mark) if left else (), 1):
-        append(arguments.results, row)
-        done[row["case"]] = row
-        ahead = (monotonic() - start) / n * (len(left) - n) / 60.0
-        say(f"{n}/{len(left)}, {ahead:.0f} min to go: {row['case']}: {_outcome(row)}")
+    if left:
+        add_rows(in_processes(judge, left, arguments.processes, mark), len(left), arguments.results, done, _outcome)
     rows = [done[case.name] for case in cases if case.name in done]
     write_markdown(to, [page(rows, len(cases), mark)])
     say(f"{to}: {len(rows)} of {len(cases)} cases")

@@ -13,21 +13,24 @@ RUN = 4
 steps of its numbers are finer than that."""
 FINER = 1e-5
 """Of the largest value: a channel whose noise is less has none, and what is level in it may be the truth."""
+FEWEST = 40
+"""Samples beside them that tell whether there is noise, to a tenth."""
 MOST = 0.5
 """Share of the samples: of what is at its end for longer nothing else is known, and it is left as it is."""
 
 
 def clipped(values: np.ndarray) -> np.ndarray:
-    """(n,) bool: whether each of values (n,), NaN where not valid, is one of RUN or more in a row at their extreme."""
+    """(n,) bool: which of values (n,), NaN where not valid, are at an extreme that is reached RUN times in a row."""
     found = np.zeros(len(values), dtype=bool)
     valid = np.isfinite(values)
-    if np.count_nonzero(valid) < 2 * RUN:
+    if not valid.any():
         return found
     for extreme in (np.nanmax(values), np.nanmin(values)):
-        edges = np.diff((values == extreme).astype(int), prepend=0, append=0)
-        for start, stop in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
-            found[start:stop] |= stop - start >= RUN
-    noise = by_differences(values[valid & ~found]) if np.count_nonzero(valid & ~found) >= 2 * RUN else 0.0
+        there = values == extreme
+        if np.convolve(there, np.ones(RUN), "valid").max(initial=0.0) >= RUN:
+            found |= there
+    rest = values[valid & ~found]
+    noise = by_differences(rest) if len(rest) >= FEWEST else 0.0
     believed = noise > FINER * np.nanmax(np.abs(values)) and found.mean() < MOST
     return found if believed else np.zeros(len(values), dtype=bool)
 
