@@ -85,6 +85,7 @@ class BodyPart(Part):
     displacement: Text | None = None
     velocity: Text | None = None
     noise: Positive | None = None  # m/s^2, or N for a measured force
+    velocity_std: NotNegative = 0.0  # m/s, of the initial velocity
 
     @model_validator(mode="after")
     def _one_kind(self):
@@ -112,6 +113,7 @@ class BodyPart(Part):
             fixed=self.fixed,
             force=self.force,
             noise=self.noise,
+            velocity_std=self.velocity_std,
             applied=self.applied,
             displacement=self.displacement,
             velocity=self.velocity,

@@ -137,11 +137,12 @@ class Estimator:
         # the part of the innovation that the update did not explain: R S^-1 R for an optimal gain, at most S
         spread = regression.gradient @ update.covariance @ regression.gradient.T
         residual_variance = np.maximum(np.diagonal(update.innovation_covariance) - np.diagonal(spread), 0.0)
+        covariance = update.covariance + update.beside
         return Estimate(
             number=sample.number,
             time_ns=sample.time_ns,
             parameters=update.theta,
-            covariance=update.covariance,
+            covariance=covariance,
             status=status,
             measured=motion.measured,
             predicted=predicted,
@@ -152,7 +153,7 @@ class Estimator:
             crush=motion.crush,
             rate=motion.rate,
             force=forces.per_unit @ update.theta + forces.shift,
-            force_std=np.sqrt(np.einsum("ep,pr,er->e", forces.per_unit, update.covariance, forces.per_unit)),
+            force_std=np.sqrt(np.einsum("ep,pr,er->e", forces.per_unit, covariance, forces.per_unit)),
             state=contact.state,
             displacement=motion.displacement,
             velocity=motion.velocity,

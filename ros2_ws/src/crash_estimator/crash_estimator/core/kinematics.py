@@ -39,6 +39,8 @@ class Motion(NamedTuple):
     measured: np.ndarray  # (q,) left-hand side of each equation, NaN where not measured
     noise: np.ndarray  # (q,) variance of it before the impact: the sensors' noise; NaN where not known
     offset_variance: np.ndarray  # (b,) (m/s^2)^2 by which the removed zero offset may be wrong; 0 where not known
+    sensors: np.ndarray  # (2, b) m/s^2 or N, squared: noise of each body's measurement before the impact, and of its
+    # mean, the zero offset; of a fixed body that of the force on it; 0 where not known
     held: np.ndarray  # (b,) m/s^2, the last valid acceleration after the impact
     displacement_by: np.ndarray | None = None  # (b, n) its change with each of n estimated errors of channels
     velocity_by: np.ndarray | None = None  # (b, n)
@@ -151,10 +153,10 @@ class Kinematics:
                 crush=crush,
                 rate=rate,
             )
-        noise, offset_variance = self._noise(state, dt)
+        noise, offset_variance, sensors = self._noise(state, dt)
         return state, Motion(
-            sample.time, dt, displacement, velocity, acceleration, crush, rate, measured, noise, offset_variance, now,
-            applied=applied,
+            sample.time, dt, displacement, velocity, acceleration, crush, rate, measured, noise, offset_variance, sensors,
+            now, applied=applied,
         )  # fmt: skip
 
     def _body_accelerations(self, values: np.ndarray) -> np.ndarray:
@@ -213,15 +215,19 @@ class Kinematics:
             force_squares=state.force_squares + np.nan_to_num(measured) ** 2,
         )
 
-    def _noise(self, state: KinematicState, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """(q,) variance of each equation's measurement, and (b,) of the error of the zero offset that was removed."""
+    def _noise(self, state: KinematicState, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(q,) variance of each equation's measurement, (b,) of the error of the zero offset that was removed, sensors."""
         count = state.count.max(initial=0.0)
         if count < FEWEST:
-            return np.full_like(state.force_squares, np.nan), np.zeros_like(state.squares)
+            nothing = np.zeros_like(state.squares)
+            return np.full_like(state.force_squares, np.nan), nothing, np.array([nothing, nothing])
         noise = state.force_squares / count
         for row, body in self.balances:
             noise[row] = state.squares[body] / count
-        return noise, state.squares / count * (1.0 / count + dt / RECORD)
+        each = state.squares / count
+        for row, _ in self.force_channels:
+            each[self.structure.equations[row]] = noise[row]
+        return noise, state.squares / count * (1.0 / count + dt / RECORD), np.array([each, each / count])
 
 
 def _check_accelerations(structure: Structure) -> None:

@@ -14,6 +14,7 @@ from .actions import Actions
 from .contact import SpringLaw
 from .estimate import ParameterStatus
 from .kinematics import Motion
+from .regressor_errors import MotionErrors
 from .structure import Parameter, Structure
 
 SHORTEST_CRUSH = 1e-3
@@ -41,6 +42,7 @@ class Regression(NamedTuple):
     time: float = 0.0  # s since the impact
     offset_gradient: np.ndarray | None = None  # (q, b) d(prediction) / d(error of each body's zero offset)
     offset_variance: np.ndarray | None = None  # (b,) (m/s^2)^2 of that error
+    errors: MotionErrors | None = None  # of the integrated motion; None: it is taken as true
 
 
 class Forces(NamedTuple):
@@ -103,10 +105,12 @@ class Regressor:
         self.own_offset = np.zeros((len(structure.equations), len(structure.bodies)))
         self.crush_of_body = np.zeros((len(structure.elements), len(structure.bodies)))
         for row, k in enumerate(structure.equations):
-            self.own_offset[row, k] = structure.bodies[k].free
+            self.own_offset[row, k] = 1.0
         for k, element in enumerate(structure.elements):
-            if not element.displacement:
-                self.crush_of_body[k, structure.ends[k]] = 1.0, -1.0
+            for sign, end in zip((1.0, -1.0), structure.ends[k]):
+                integrated = structure.bodies[end].acceleration and not element.displacement
+                self.crush_of_body[k, end] = sign if integrated else 0.0
+        self.velocity_variance = np.array([body.velocity_std for body in structure.bodies]) ** 2
         self.estimated = np.array([p.coefficient.estimated for p in parameters], dtype=bool)
         self.value = np.where(self.estimated, 0.0, [p.coefficient.value for p in parameters])
         self.known_unloading = np.array([e.unloading or 0.0 for e in structure.elements])
@@ -151,19 +155,23 @@ class Regressor:
         walk = np.where(active & ~law.on_line[self.element], self.drift_squared * folds[self.element], 0.0)
         noise = np.maximum(np.where(np.isnan(self.noise), motion.noise, self.noise), QUIETEST**2)
         slopes = self._slopes(law, theta, factor)
-        per_offset = self.share @ self._per_offset(motion, slopes)
+        by_d, by_u = (-self.share @ (slope[:, None] * self.crush_of_body) for slope in slopes)
         if self.actions is not None:
             static = np.where(self.of_spring, forces.per_unit, 0.0) @ theta[: len(lever)] + shift
             per_unit = self.actions.forces(motion, law, static)
             known, gradient, heavier = self.actions.added(known, gradient, motion, per_unit, slopes, theta)
-            per_offset = heavier[:, None] * per_offset
+            by_d, by_u = heavier[:, None] * by_d, heavier[:, None] * by_u
             active = np.concatenate([active, self.actions.estimated & (gradient[:, len(lever) :] != 0.0).any(axis=0)])
             walk = np.concatenate([walk, np.zeros(len(per_unit[0]))])
             forces = Forces(np.hstack([forces.per_unit, per_unit]), shift)
         return (
             Regression(
                 known, gradient, measured, active, walk, noise, motion.dt, motion.time,
-                self.own_offset + per_offset, motion.offset_variance,
+                self.own_offset + 0.5 * motion.time**2 * by_d + motion.time * by_u, motion.offset_variance,
+                MotionErrors(
+                    np.stack([self.own_offset, by_u, by_d], axis=-1), motion.sensors[1], motion.sensors[0] * motion.dt,
+                    self.velocity_variance, motion.time,
+                ),
             ),
             forces,
         )  # fmt: skip
@@ -188,12 +196,6 @@ class Regressor:
         slope = np.where(law.on_line, self.known_unloading if unloading is None else unloading, slope)
         slope = slope if factor is None else factor * slope
         return np.where(law.carries, [slope, theta[self.damping_index]], 0.0)
-
-    def _per_offset(self, motion: Motion, slopes: np.ndarray) -> np.ndarray:
-        """(e, b) N s^2/m. An accelerometer whose zero is wrong by b has moved its body by b t^2 / 2 too far and made it
-        b t too fast, and so changed the element's force by -(dF/dX t^2 / 2 + dF/dV t) b."""
-        change = 0.5 * motion.time**2 * slopes[0] + motion.time * slopes[1]
-        return -change[:, None] * self.crush_of_body
 
     def secant(self, theta: np.ndarray, peak: np.ndarray) -> np.ndarray:
         """(e,) N/m: each element's stiffness, at the crush `peak` (e,) where it has higher powers."""

@@ -36,6 +36,7 @@ class Body:
     displacement: str | None = None  # channel of a free body's displacement, instead of or beside its acceleration
     velocity: str | None = None  # channel of its velocity, likewise
     derived: bool = False  # its acceleration is `derived_motion`'s, and no measurement
+    velocity_std: float = 0.0  # m/s, standard deviation of its initial velocity
 
     @property
     def free(self) -> bool:

@@ -15,7 +15,7 @@ the update of all, which factors take, and a square added for those that are hel
 import numpy as np
 from numba import njit
 
-from ..estimators.kalman import SMALLEST_SHARE
+from ..regressor_errors import SMALLEST_SHARE
 from ..kinematics import FEWEST, RECORD
 from ..regression import QUIETEST
 from .factors import add_square, observe, product_of, seen_through, widen

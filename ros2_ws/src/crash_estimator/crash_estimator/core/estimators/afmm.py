@@ -22,6 +22,7 @@ import numpy as np
 
 from ..estimate import Event
 from ..regression import Regression
+from ..regressor_errors import SMALLEST_SHARE
 from ..structure import ModelError
 from .kalman import Kalman, KalmanState
 from .update import Theta, Update
@@ -99,7 +100,7 @@ class Afmm:
         """The bank's step on the means over the window."""
         mean = mean_of(window, now)
         noise = np.where(np.isnan(state.noise), mean.noise, state.noise)
-        models = _normalised([self._weighed(model, mean, noise) for model in state.models])
+        models = _normalised([self._weighed(model, mean, noise, window.walk) for model in state.models])
         best = _likeliest(models)
         noise = self._learn_noise(noise, mean, best.products)
         reported, events = state.reported, ()
@@ -112,14 +113,19 @@ class Afmm:
             models=self._branched(models, now.time), noise=noise, reported=reported, update=update
         ), events
 
-    def _weighed(self, model: Model, mean: Regression, noise: np.ndarray) -> Model:
-        """The model after one step of its filter, its weight times the likelihood of what it did not expect."""
+    def _weighed(self, model: Model, mean: Regression, noise: np.ndarray, walk: np.ndarray) -> Model:
+        """The model after one step of its filter, its weight times the likelihood of what it did not expect.
+
+        walk (p,): what theta may have walked in the meantime, which is this method's lag.
+        """
         innovation = mean.measured - mean.known - mean.gradient @ model.filter.theta
         state, update = self._filter.update(model.filter._replace(noise=noise), mean)
         valid = ~np.isnan(innovation)
         covariance = update.innovation_covariance[np.ix_(valid, valid)]
         _, log_determinant = np.linalg.slogdet(covariance)
         squares = innovation[valid] @ np.linalg.solve(covariance, innovation[valid])
+        size = np.maximum(np.abs(state.theta), SMALLEST_SHARE * self.settings.scale)
+        state = state._replace(beside=state.beside.walked(walk * size**2))
         residual = mean.measured - mean.known - mean.gradient @ state.theta
         log_weight = model.log_weight - 0.5 * (squares + log_determinant)
         return Model(state, log_weight, model.jumped, update, innovation * residual)
@@ -140,14 +146,15 @@ class Afmm:
         """Mean and covariance of the mixture."""
         weights = np.exp([model.log_weight for model in models])
         theta = sum(w * model.filter.theta for w, model in zip(weights, models))
-        covariance = np.zeros((len(theta), len(theta)))
+        covariance, beside = np.zeros((2, len(theta), len(theta)))
         for w, model in zip(weights, models):
             away = model.filter.theta - theta
             covariance += w * (model.filter.covariance + np.outer(away, away))
+            beside += w * model.filter.beside.covariance
         ranked = sorted(models, key=lambda model: -model.log_weight)
         extra = [x for m in ranked for x in (float(np.exp(m.log_weight)), m.jumped if m.jumped > -np.inf else np.nan)]
         extra += [0.0, np.nan] * (self.models - len(ranked))
-        return ranked[0].update._replace(theta=theta, covariance=covariance, extra=tuple(extra))
+        return ranked[0].update._replace(theta=theta, covariance=covariance, extra=tuple(extra), beside=beside)
 
     def _event(self, best: Model, probability: float, state: AfmmState, time: float) -> Event:
         change = np.where(self.settings.std > 0.0, best.filter.theta - state.update.theta, 0.0) / self.settings.scale

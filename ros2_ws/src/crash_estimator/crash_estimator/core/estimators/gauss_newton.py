@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..regression import Regression
+from ..regressor_errors import MotionErrors
 from ..structure import ModelError
 from .rls import Rls, RlsState
 from .update import Theta, Update
@@ -46,6 +47,8 @@ class Past(NamedTuple):
     gradient: np.ndarray  # (q, p) psi
     error: np.ndarray  # (q,) eps after the update, 0 where not measured
     filtered: np.ndarray  # (q, n) Psi
+    errors: np.ndarray | None = None  # (q, b, 3) of the errors of the motion
+    errors_filtered: np.ndarray | None = None  # (q, b, 3) as the noise model passes them on
 
 
 class GaussNewtonState(NamedTuple):
@@ -143,6 +146,7 @@ class GaussNewton:
             gradient=filtered,
             active=np.concatenate([regression.active, np.ones(n - parameters, dtype=bool)]),
             walk=np.concatenate([regression.walk, np.zeros(n - parameters)]),
+            errors=self._passed_on(state, regression),
         )
         trust = np.where(learning, 1.0, TRUST)
         rls, update = self._rls(equations).update(self._remembered(state.rls, regression.dt), wide, trust)
@@ -151,8 +155,10 @@ class GaussNewton:
         target = regression.measured - regression.known
         error = np.nan_to_num(target - regression.gradient @ rls.theta[:parameters] - expected_after)
         longest = max(max(order) for order in self.orders(equations))
-        past = (Past(target, regression.gradient, error, filtered), *state.past)[:longest]
+        given, passed = (None if r.errors is None else r.errors.gradient for r in (regression, wide))
+        past = (Past(target, regression.gradient, error, filtered, given, passed), *state.past)[:longest]
         update = update._replace(
+            beside=update.beside[:parameters, :parameters],
             theta=rls.theta[:parameters],
             covariance=update.covariance[:parameters, :parameters],
             clamped=update.clamped[:parameters],
@@ -215,6 +221,19 @@ class GaussNewton:
             for j, then in zip(range(a.start, a.stop), past, strict=False):
                 filtered[k] -= theta[j] * then.filtered[k]
         return expected, filtered
+
+    def _passed_on(self, state: GaussNewtonState, regression: Regression) -> MotionErrors | None:
+        """The errors of the motion in eps: through the noise model, as Psi is; they change little within its orders."""
+        errors = regression.errors
+        if errors is None:
+            return None
+        filtered, theta = errors.gradient.copy(), state.rls.theta
+        for k, (d, a) in enumerate(self._slices(len(filtered))):
+            for i, then in zip(range(d.start, d.stop), state.past, strict=False):
+                filtered[k] += theta[i] * then.errors[k] * ~np.isnan(then.target[k])
+            for j, then in zip(range(a.start, a.stop), state.past, strict=False):
+                filtered[k] -= theta[j] * then.errors_filtered[k]
+        return errors._replace(gradient=filtered)
 
     def _slices(self, equations: int) -> list[tuple[slice, slice]]:
         """Where each equation's d and a stand in theta."""

@@ -31,10 +31,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..regression import QUIETEST, Regression
+from ..regressor_errors import SMALLEST_SHARE, Consequence, none_yet
 from .update import Theta, Update, within_bounds
-
-SMALLEST_SHARE = 0.05
-"""Of a parameter's scale: a stiffness clamped to zero must be able to leave it again."""
 
 
 class KalmanState(NamedTuple):
@@ -42,6 +40,7 @@ class KalmanState(NamedTuple):
     root: np.ndarray  # (p, p) of the covariance, or (p + b, p + b) once the offsets' errors have joined
     offsets: np.ndarray  # (b,) m/s^2, the zero offsets' errors; empty until they have joined
     noise: np.ndarray  # (q,) variance of each equation's error, R2; NaN until the first update
+    beside: Consequence | None = None  # what errors of the motion have made of theta and the offsets, beside P
 
     @property
     def covariance(self) -> np.ndarray:
@@ -78,15 +77,19 @@ class Kalman:
         target = regression.measured - regression.known
         equations = [(psi, y, r) for psi, y, r in zip(gradient, target, noise) if not np.isnan(y)]
 
+        gains: list[np.ndarray] = []
+
         def assimilate(theta: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             """The equations' errors are independent, so they update in turn, each with a scalar to divide by."""
             root, both = prior, np.concatenate([theta, offsets])
+            gains.clear()
             moved = np.concatenate([free, always])
             for psi_all, y, r in equations:
                 seen = np.where(moved, psi_all, 0.0) @ root  # psi S
                 gain = np.where(moved, root @ seen / (r + seen @ seen), 0.0)
                 both = both + gain * (y - psi_all @ both)
                 root = np.column_stack([root - np.outer(gain, seen), gain * np.sqrt(r)])
+                gains.append(gain)
             return both, root
 
         bounds = self.settings if self.constrained else self.settings._replace(lower=-np.inf, upper=np.inf)
@@ -97,10 +100,37 @@ class Kalman:
         expected, expected_after = gradient[:, p:] @ offsets, gradient[:, p:] @ both[p:]
         residual = target - regression.gradient @ updated - expected_after
         products = residual * (target - regression.gradient @ theta - expected)
-        state = KalmanState(updated, narrowed(root), both[p:], self._adapt(noise, products, regression))
+        beside = self._beside(state, regression, gradient, gains)
+        state = KalmanState(updated, narrowed(root), both[p:], self._adapt(noise, products, regression), beside)
         return state, Update(
-            updated, state.covariance, innovation_covariance, clamped, expected_error=(expected, expected_after)
-        )
+            updated, state.covariance, innovation_covariance, clamped, expected_error=(expected, expected_after),
+            beside=beside.covariance[:p, :p],
+        )  # fmt: skip
+
+    def _beside(
+        self, state: KalmanState, regression: Regression, gradient: np.ndarray, gains: list[np.ndarray]
+    ) -> Consequence:
+        """Errors of the motion, equation by equation as they were assimilated; those that are estimated are in P."""
+        errors = regression.errors
+        beside = state.beside or self._at_first(regression, gradient.shape[1])
+        if errors is None:
+            return beside
+        if self.offsets:
+            errors = errors._replace(zero=np.where(regression.offset_variance > 0.0, 0.0, errors.zero))
+        measured = np.flatnonzero(~np.isnan(regression.measured))
+        for row, gain in zip(measured, gains, strict=True):
+            one = errors._replace(gradient=errors.gradient[row : row + 1])
+            beside = beside.after(gain[:, None], gradient[row : row + 1], one)
+        return beside
+
+    def _at_first(self, regression: Regression, count: int) -> Consequence:
+        """P starts from zeros that are wrong by their own error and by the noise's mean; the latter is followed here."""
+        beside = none_yet(count, 0 if regression.errors is None else len(regression.errors.zero))
+        if self.offsets and regression.errors is not None:
+            surplus = np.where(regression.offset_variance > 0.0, regression.errors.zero - regression.offset_variance, 0.0)
+            p = count - len(surplus)
+            return beside.walked(np.concatenate([np.zeros(p), surplus]))
+        return beside
 
     def _walk(self, theta: np.ndarray, regression: Regression, extra: int) -> np.ndarray:
         """Root of R1: a column for each parameter that walks."""

@@ -30,6 +30,7 @@ import numpy as np
 
 from ..estimate import Event
 from ..regression import Regression
+from ..regressor_errors import SMALLEST_SHARE, Consequence, none_yet
 from .update import Theta, Update, within_bounds
 
 NOISE_FLOOR = 0.1
@@ -47,6 +48,7 @@ class RlsState(NamedTuple):
     errors: tuple[np.ndarray, ...]  # and their errors
     influence: tuple[np.ndarray, ...]  # B_i of each, (p, q)
     variances: tuple[np.ndarray, ...]  # r_i of each, (q,)
+    beside: Consequence | None = None  # what the errors of the motion and the lag have made of theta
 
 
 class Step(NamedTuple):
@@ -84,11 +86,19 @@ class Rls:
         """trust: (q,) share of its information that an equation is counted with; its noise counts as so much larger."""
         state = self._started(state, regression)
         innovation_covariance = self._innovation_covariance(state, regression)
-        state, step = self._correct(state, regression, 1.0, trust)
+        state, step = self._correct(self._walked(state, regression), regression, 1.0, trust)
         state = self._remember(state, regression, step, state.residual_variance / trust)
         state, clamped, events = self._rewind(state, step.clamped)
         state = self._learn_residual(state, regression, step.error)
-        return state, Update(state.theta, self._covariance(state), innovation_covariance, clamped, events)
+        return state, Update(
+            state.theta, self._covariance(state), innovation_covariance, clamped, events, beside=state.beside.covariance
+        )
+
+    def _walked(self, state: RlsState, regression: Regression) -> RlsState:
+        size = np.maximum(np.abs(state.theta), SMALLEST_SHARE * self.settings.scale)
+        bodies = 0 if regression.errors is None else len(regression.errors.zero)
+        beside = none_yet(len(state.theta), bodies) if state.beside is None else state.beside
+        return state._replace(beside=beside.walked(regression.walk * size**2))
 
     def _started(self, state: RlsState, regression: Regression) -> RlsState:
         """Lambda starts from the noise known before the impact."""
@@ -145,6 +155,7 @@ class Rls:
             gamma=gamma,
             carried=lessen @ state.carried @ lessen.T,
             influence=tuple(lessen @ part for part in state.influence),
+            beside=state.beside.after(gain, regression.gradient, regression.errors),
         )
         return state, Step(gain, error, clamped)
 
@@ -175,7 +186,7 @@ class Rls:
         while passes < self.rewinds and excess > 1.0:
             again, errors, held = state, [], clamped
             for k, regression in enumerate(state.window):
-                again, step = self._correct(again, regression, self.cr)
+                again, step = self._correct(again, regression._replace(errors=state.window[-1].errors), self.cr)
                 influence = list(again.influence)
                 influence[k] = influence[k] + step.gain
                 again, held = again._replace(influence=tuple(influence)), step.clamped

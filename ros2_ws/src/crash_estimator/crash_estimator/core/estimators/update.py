@@ -24,7 +24,7 @@ class Update(NamedTuple):
     """What a method says after one sample: p parameters, q equations."""
 
     theta: np.ndarray  # (p,)
-    covariance: np.ndarray  # (p, p)
+    covariance: np.ndarray  # (p, p) as the method has it
     innovation_covariance: np.ndarray  # (q, q)
     clamped: np.ndarray  # (p,) held at a bound in this step
     events: tuple[Event, ...] = ()
@@ -32,6 +32,7 @@ class Update(NamedTuple):
     # (q,) each: the error that a noise model expected, with theta before and after the update
     extra: tuple[float, ...] = ()  # what the method knows besides theta, named by its `extra_names`
     extra_std: tuple[float, ...] = ()  # of each; empty: none is known
+    beside: np.ndarray | float = 0.0  # (p, p) of theta, what is due to errors of the motion and to the lag
 
 
 def theta_settings(structure: Structure) -> Theta:

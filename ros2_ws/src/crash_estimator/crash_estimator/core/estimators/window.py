@@ -16,6 +16,8 @@ class Window(NamedTuple):
     noise: np.ndarray  # (q,) variance of a sample
     active: np.ndarray  # (p,)
     duration: float  # s
+    walk: np.ndarray  # (p,) relative variance of theta's walk, which a method may not follow
+    by_errors: np.ndarray | float  # (q, b, 3) of the errors of the motion
 
 
 def widened(window: Window | None, regression: Regression) -> Window:
@@ -24,11 +26,16 @@ def widened(window: Window | None, regression: Regression) -> Window:
     target = np.where(valid, regression.measured - regression.known, 0.0)
     gradient = np.where(valid[:, None], regression.gradient, 0.0)
     noise = np.where(valid, np.nan_to_num(regression.noise, nan=1.0), 0.0)
+    errors = regression.errors
+    by_errors = 0.0 if errors is None else np.where(valid[:, None, None], errors.gradient, 0.0)
     if window is None:
-        return Window(valid.astype(float), target, gradient, noise, regression.active, regression.dt)
+        return Window(
+            valid.astype(float), target, gradient, noise, regression.active, regression.dt, regression.walk, by_errors
+        )
     return Window(
         window.samples + valid, window.target + target, window.gradient + gradient, window.noise + noise,
         window.active | regression.active, window.duration + regression.dt,
+        window.walk + regression.walk, window.by_errors + by_errors,
     )  # fmt: skip
 
 
@@ -39,4 +46,9 @@ def mean_of(window: Window, now: Regression) -> Regression:
     gradient = np.nan_to_num(window.gradient / count[:, None])
     noise = np.nan_to_num(window.noise / count**2, nan=1.0)
     still = np.zeros(len(window.active))
-    return Regression(nothing, gradient, target, window.active, still, noise, window.duration, now.time)
+    errors = now.errors
+    if errors is not None:
+        errors = errors._replace(gradient=np.nan_to_num(window.by_errors / count[:, None, None]))
+    return Regression(
+        nothing, gradient, target, window.active, still, noise, window.duration, now.time, errors=errors
+    )
