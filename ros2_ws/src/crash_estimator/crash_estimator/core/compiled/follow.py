@@ -6,6 +6,7 @@ from numba import njit
 from ..estimate import ParameterStatus
 from .kalman import kalman_step
 from .motion import APART, UNLOADING, move, regress, touch
+from .regressor_errors import known_of, move_on, sensors_of
 from .rls import rls_step
 from .views import method_of, plan_views, row_views, size_of, state_views
 
@@ -21,7 +22,8 @@ def follow(whole, others, state, last_row, times_ns, values, rows):
     n, method = size_of(whole), method_of(others)
     plan, s = plan_views(whole, others, n), state_views(state, n)
     p, q, e = n.estimated, n.equations, n.elements
-    per_offset = np.zeros((e, n.offsets))
+    by_errors, errors = np.zeros((3, q, n.bodies)), np.zeros((n.bodies, 6))
+    zero, density = np.zeros(n.bodies), np.zeros(n.bodies)
     clean, bodies = np.empty(n.channels), np.empty(n.bodies)
     lever, shift, per_unit = np.empty(e), np.empty(e), np.empty(n.parameters)
     known, gradient, learnt, target = np.empty(q), np.empty((q, p + n.offsets)), np.empty(q), np.empty(q)
@@ -34,16 +36,27 @@ def follow(whole, others, state, last_row, times_ns, values, rows):
         dt = move(plan, s, row, times_ns[t], values[t], clean, bodies)
         touch(plan, s, row, time, lever, shift)
         excited = regress(
-            plan, s, row, n, dt, time, lever, shift, per_unit, per_offset, known, gradient, active, walk, learnt
+            plan, s, row, n, dt, time, lever, shift, per_unit, by_errors, known, gradient, active, walk, learnt
         )
         before[:] = s.theta
         clamped[:] = 0.0
         row.rewinds[0] = 0.0
         if dt > 0.0 and excited:
+            sensors_of(plan, s, zero, density, dt)
+            if n.offsets:
+                for b in range(n.offsets):
+                    zero[b] = 0.0 if s.squares[b] > 0.0 else zero[b]
+            known_of(zero, density, plan.velocity_variance, time, errors)
+            move_on(s, time)
             if method.is_kalman:
-                kalman_step(plan, method, n, s, row, dt, known, gradient, active, walk, learnt, target, clamped)
+                kalman_step(
+                    plan, method, n, s, row, dt, known, gradient, by_errors, errors, active, walk, learnt, target,
+                    clamped,
+                )  # fmt: skip
             else:
-                rls_step(plan, method, s, row, dt, known, gradient, active, walk, learnt, target, clamped)
+                rls_step(
+                    plan, method, s, row, dt, known, gradient, by_errors, errors, active, walk, learnt, target, clamped
+                )
         else:
             gradient[:, p:] = 0.0  # nothing is expected of the zero offsets' errors without an update
             row.innovation_covariance[:, :] = 0.0
@@ -65,7 +78,7 @@ def _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped):
             row.parameters[j], row.std[j], row.status[j] = plan.value[j], 0.0, KNOWN
             continue
         row.parameters[j] = s.theta[slot]
-        row.std[j] = np.sqrt(s.covariance[slot, slot])
+        row.std[j] = np.sqrt(s.covariance[slot, slot] + s.beside[slot, slot])
         status = ESTIMATED
         if row.state[k] == APART:
             status = SEPARATE
@@ -74,7 +87,9 @@ def _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped):
         elif plan.is_stiffness[j] and plan.unloading[k] > 0.0 and row.state[k] == UNLOADING:
             status = UNLOADS
         row.status[j] = status
-    row.covariance[:, :] = s.covariance
+    for j in range(n.estimated):
+        for h in range(n.estimated):
+            row.covariance[j, h] = s.covariance[j, h] + s.beside[j, h]
     for i in range(q):
         predicted = expected = known[i]
         spread = 0.0
@@ -97,7 +112,7 @@ def _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped):
         row.force[k] += per_unit[j] * row.parameters[j]
         for h in range(len(per_unit)):
             if slot >= 0 and plan.element[h] == k and plan.slot[h] >= 0:
-                row.force_std[k] += per_unit[j] * s.covariance[slot, plan.slot[h]] * per_unit[h]
+                row.force_std[k] += per_unit[j] * row.covariance[slot, plan.slot[h]] * per_unit[h]
     for k in range(len(shift)):
         row.force_std[k] = np.sqrt(max(row.force_std[k], 0.0))
 

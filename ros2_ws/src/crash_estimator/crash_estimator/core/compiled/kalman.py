@@ -18,16 +18,17 @@ from numba import njit
 from ..regressor_errors import SMALLEST_SHARE
 from ..kinematics import FEWEST, RECORD
 from ..regression import QUIETEST
+from .regressor_errors import pass_on
 from .factors import add_square, observe, product_of, seen_through, widen
 
 
 @njit(cache=True)
-def kalman_update(theta, factors, noise, gradient, target, active, lower, upper, constrained, clamped):
+def kalman_update(theta, factors, noise, gradient, target, active, lower, upper, constrained, clamped, gain):
     """Update theta (p,) and its covariance's factors (p, p) in place by one sample of q equations.
 
     noise (q,) variances; gradient (q, p); target (q,) measured minus known, NaN where not measured; active (p,) 1.0
     where estimated; lower, upper: bounds of the first of them; clamped (p,) is set to 1.0 where one is held at its
-    bound.
+    bound; gain (p, q) is filled with that of each equation in its turn.
     """
     start = theta.copy()
     prior = factors.copy()
@@ -38,9 +39,10 @@ def kalman_update(theta, factors, noise, gradient, target, active, lower, upper,
     while True:
         theta[:] = start
         factors[:] = prior
+        gain[:, :] = 0.0
         for i in range(len(target)):
             if target[i] == target[i]:
-                _one_equation(theta, factors, noise[i], gradient[i], target[i], free, psi, spread)
+                _one_equation(theta, factors, noise[i], gradient[i], target[i], free, psi, spread, gain[:, i])
         again = False
         if constrained:
             for j in range(len(lower)):
@@ -54,7 +56,7 @@ def kalman_update(theta, factors, noise, gradient, target, active, lower, upper,
 
 
 @njit(cache=True, inline="always")
-def _one_equation(theta, factors, r, gradient, target, free, psi, spread):
+def _one_equation(theta, factors, r, gradient, target, free, psi, spread, gain):
     """spread: first P psi', then of that only what is held."""
     error, last = target, -1
     for j in range(len(theta)):
@@ -65,6 +67,7 @@ def _one_equation(theta, factors, r, gradient, target, free, psi, spread):
         return
     for j in range(len(theta)):
         if free[j] == 1.0:
+            gain[j] = spread[j] / s
             theta[j] += spread[j] / s * error
             spread[j] = 0.0
         elif spread[j] != 0.0:
@@ -73,7 +76,9 @@ def _one_equation(theta, factors, r, gradient, target, free, psi, spread):
 
 
 @njit(cache=True, inline="always")
-def kalman_step(plan, method, n, s, row, dt, known, gradient, active, walk, learnt, target, clamped):
+def kalman_step(
+    plan, method, n, s, row, dt, known, gradient, by_errors, errors, active, walk, learnt, target, clamped
+):  # fmt: skip
     """Random walk, update, and adaptation of R2 to what the model cannot follow."""
     p, q = len(s.theta), len(known)
     unit, through = np.empty(p), np.empty((q, p))
@@ -86,15 +91,21 @@ def kalman_step(plan, method, n, s, row, dt, known, gradient, active, walk, lear
         for b in range(n.offsets):
             variance = s.squares[b] / count * (1.0 / count + dt / RECORD) if count >= FEWEST else 0.0
             s.factors[n.estimated + b, n.estimated + b] = variance
+            if count >= FEWEST:
+                s.beside[n.estimated + b, n.estimated + b] = s.squares[b] / count**2 - variance
     for i in range(q):
         if np.isnan(s.noise[i]):
             s.noise[i] = learnt[i] if learnt[i] == learnt[i] else 1.0
         target[i] = row.measured[i] - known[i]
     seen_through(s.factors, gradient, s.noise, through, row.innovation_covariance)
-    before = s.theta.copy()
+    before, gain = s.theta.copy(), np.empty((p, q))
     kalman_update(
-        s.theta, s.factors, s.noise, gradient, target, active, plan.lower, plan.upper, method.constrained, clamped
+        s.theta, s.factors, s.noise, gradient, target, active, plan.lower, plan.upper, method.constrained, clamped, gain
     )
+    for i in range(q):
+        if target[i] == target[i]:
+            one = slice(i, i + 1)
+            pass_on(s, gain[:, one], gradient[one], by_errors[:, one], errors)
     product_of(s.factors, s.covariance)
     if method.noise_memory > 0.0:
         share = dt / (dt + method.noise_memory)

@@ -55,6 +55,9 @@ def state_fields(size: Size) -> dict[str, tuple[int, ...]]:
         "window_error": (m, q),
         "window_influence": (m, p, q),
         "window_variance": (m, q),
+        "beside": (p + n, p + n),  # what errors of the motion, and the lag, add to the covariance
+        "beside_shared": (3, b, p + n),  # its part with each body's errors: zero, velocity, displacement
+        "beside_time": (1,),  # s since the impact
     }
 
 

@@ -105,11 +105,12 @@ def touch(plan, s, row, time, lever, shift):
 
 
 @njit(cache=True, inline="always")
-def regress(plan, s, row, n, dt, time, lever, shift, per_unit, per_offset, known, gradient, active, walk, noise):
+def regress(plan, s, row, n, dt, time, lever, shift, per_unit, by_errors, known, gradient, active, walk, noise):
     """Fill the regression of this sample -> whether it says anything about an estimated parameter.
 
-    per_unit (all,) is each parameter's force for one unit of it, per_offset (e, b) each element's for an error of a
-    body's zero offset; the others are as in `regression.Regression`, gradient with the offsets' columns at its end.
+    per_unit (all,) is each parameter's force for one unit of it, by_errors (3, q, b) each equation's change for an
+    error of a body's zero, velocity and displacement; the others are as in `regression.Regression`, gradient with the
+    offsets' columns at its end.
     """
     q = len(known)
     before_impact = s.count.max() if len(s.count) else 0.0
@@ -144,21 +145,26 @@ def regress(plan, s, row, n, dt, time, lever, shift, per_unit, per_offset, known
             gradient[i, slot] = plan.share[i, k] * per_unit[j]
             if gradient[i, slot] != 0.0 and row.measured[i] == row.measured[i]:
                 excited = True
-    for k in range(n.offsets and len(shift)):
+    by_errors[0] = plan.own_offset
+    by_errors[1:] = 0.0
+    for k in range(len(shift)):
         slope = 0.0
         if row.state[k] == UNLOADING and plan.unloading[k] > 0.0:
             slope = plan.unloading[k]
         elif row.state[k] != APART:
             slope = value_of(plan.value, plan.slot, s.theta, plan.stiffness[k])
         damping = value_of(plan.value, plan.slot, s.theta, plan.damping[k]) if row.state[k] != APART else 0.0
+        for end in range(2):
+            b = plan.ends[k, end]
+            sign = plan.crush_of_body[k, b]
+            if sign != 0.0:
+                for i in range(q):
+                    by_errors[1, i, b] -= plan.share[i, k] * damping * sign
+                    by_errors[2, i, b] -= plan.share[i, k] * slope * sign
+    for i in range(q):
         for b in range(n.offsets):
-            per_offset[k, b] = -(0.5 * time**2 * slope + time * damping) * plan.crush_of_body[k, b]
-    for b in range(n.offsets):
-        for i in range(q):
-            total = plan.own_offset[i, b]
-            for k in range(len(shift)):
-                total += plan.share[i, k] * per_offset[k, b]
-            gradient[i, n.estimated + b] = total
+            moved = 0.5 * time**2 * by_errors[2, i, b] + time * by_errors[1, i, b]
+            gradient[i, n.estimated + b] = by_errors[0, i, b] + moved
     return excited
 
 

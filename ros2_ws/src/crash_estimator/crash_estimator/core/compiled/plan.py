@@ -43,8 +43,9 @@ class Plan(NamedTuple):
     lower: np.ndarray  # (p,)
     upper: np.ndarray  # (p,)
     scale: np.ndarray  # (p,)
-    own_offset: np.ndarray  # (q, b) 1 where the equation is that body's balance
-    crush_of_body: np.ndarray  # (e, b) d(crush) / d(displacement)
+    own_offset: np.ndarray  # (q, b) 1 where the equation is that body's
+    crush_of_body: np.ndarray  # (e, b) d(crush) / d(displacement) where it is integrated, else 0
+    velocity_variance: np.ndarray  # (b,) of the initial velocity
 
 
 class MethodPlan(NamedTuple):
@@ -97,6 +98,7 @@ def make_plan(kinematics: Kinematics, contact: Contact, regressor: Regressor, se
         scale=settings.scale[estimated],
         own_offset=regressor.own_offset,
         crush_of_body=regressor.crush_of_body,
+        velocity_variance=regressor.velocity_variance,
     )
 
 

@@ -3,6 +3,9 @@
 import numpy as np
 from numba import njit
 
+from ..regressor_errors import SMALLEST_SHARE
+from .regressor_errors import pass_on
+
 
 @njit(cache=True, error_model="numpy")
 def invert(matrix, keep, out):
@@ -48,7 +51,9 @@ def multiply(a, b, out):
 
 
 @njit(cache=True)
-def correct(plan, method, s, gradient, target, active, learnt, dt, multiplier, error, clamped, gain):
+def correct(
+    plan, method, s, gradient, by_errors, errors, target, active, learnt, dt, multiplier, error, clamped, gain
+):  # fmt: skip
     """One step of the recursion in place; fills error (q,) (NaN where not measured), clamped (p,) and gain (p, q).
 
     The influence of the sample itself is left to the caller.
@@ -136,6 +141,7 @@ def correct(plan, method, s, gradient, target, active, learnt, dt, multiplier, e
     for t in range(len(s.window_dt)):
         before[:, :] = s.window_influence[t]
         multiply(lessen, before, s.window_influence[t])
+    pass_on(s, gain, gradient, by_errors, errors)
 
 
 @njit(cache=True)
@@ -195,29 +201,31 @@ def excess_of(method, s, errors):
 
 
 @njit(cache=True)
-def rewind(plan, method, s, clamped):
+def rewind(plan, method, s, by_errors, errors, clamped):
     """Use the window again with the larger correction while that lessens the mean error -> passes made."""
     m, q = s.window_error.shape
-    errors, error, held = np.empty((m, q)), np.empty(q), clamped.copy()
+    repeated, error, held = np.empty((m, q)), np.empty(q), clamped.copy()
     gain, chosen = np.empty((len(s.theta), q)), np.empty(q)
     passes, excess = 0, excess_of(method, s, s.window_error)
     while passes < method.rewinds and excess > 1.0:
         theta, information, carried = s.theta.copy(), s.information.copy(), s.carried.copy()
         error_covariance, gamma, influence = s.error_covariance.copy(), s.gamma[0], s.window_influence.copy()
+        beside, shared = s.beside.copy(), s.beside_shared.copy()
         chosen_variance(s, chosen)
         for t in range(m):
             correct(
-                plan, method, s, s.window_gradient[t], s.window_target[t], s.window_active[t], s.window_noise[t],
-                s.window_dt[t], method.cr, error, held, gain,
+                plan, method, s, s.window_gradient[t], by_errors, errors, s.window_target[t], s.window_active[t],
+                s.window_noise[t], s.window_dt[t], method.cr, error, held, gain,
             )  # fmt: skip
             s.window_influence[t] += gain
-            errors[t] = error
-        now = excess_of(method, s, errors)
+            repeated[t] = error
+        now = excess_of(method, s, repeated)
         if now >= excess:
             s.theta[:], s.information[:, :], s.carried[:, :] = theta, information, carried
             s.error_covariance[:, :], s.gamma[0], s.window_influence[:] = error_covariance, gamma, influence
+            s.beside[:, :], s.beside_shared[:] = beside, shared
             break
-        s.window_error[:, :] = errors
+        s.window_error[:, :] = repeated
         s.window_variance[:] = np.maximum(s.window_variance, chosen)
         clamped[:] = held
         excess = now
@@ -253,7 +261,7 @@ def remember(s, gradient, target, learnt, active, dt, error, gain, m):
 
 
 @njit(cache=True, inline="always")
-def rls_step(plan, method, s, row, dt, known, gradient, active, walk, learnt, target, clamped):
+def rls_step(plan, method, s, row, dt, known, gradient, by_errors, errors, active, walk, learnt, target, clamped):
     """Correction, rewinds (MRLS), and the slow residual variance that sets the error limits."""
     p, q, m = len(s.theta), len(known), len(s.window_dt)
     unstarted = False
@@ -274,12 +282,16 @@ def rls_step(plan, method, s, row, dt, known, gradient, active, walk, learnt, ta
                     total += gradient[i, j] * s.covariance[j, h] * gradient[k, h]
             row.innovation_covariance[i, k] = total
     error, gain = np.empty(q), np.empty((p, q))
-    correct(plan, method, s, gradient, target, active, learnt, dt, 1.0, error, clamped, gain)
+    for j in range(p):
+        s.beside[j, j] += walk[j] * max(abs(s.theta[j]), SMALLEST_SHARE * plan.scale[j]) ** 2
+    correct(
+        plan, method, s, gradient, by_errors, errors, target, active, learnt, dt, 1.0, error, clamped, gain
+    )  # fmt: skip
     if not m:
         add_influence(s.carried, gain, s.noise)
     else:
         remember(s, gradient, target, learnt, active, dt, error, gain, m)
-        row.rewinds[0] = rewind(plan, method, s, clamped) if int(s.clock[1]) == m else 0
+        row.rewinds[0] = rewind(plan, method, s, by_errors, errors, clamped) if int(s.clock[1]) == m else 0
     share = dt / (dt + 4.0 * method.memory)
     for i in range(q):
         residual = target[i]

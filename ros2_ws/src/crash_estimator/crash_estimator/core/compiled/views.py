@@ -39,6 +39,9 @@ class StateViews(NamedTuple):
     window_error: np.ndarray
     window_influence: np.ndarray
     window_variance: np.ndarray
+    beside: np.ndarray
+    beside_shared: np.ndarray
+    beside_time: np.ndarray
 
 
 class RowViews(NamedTuple):
@@ -81,7 +84,7 @@ def state_views(s, n):
     w = n.estimated + n.offsets
     k = cuts((
         2, c, c, b, q, b, b, b, e, e, e, e, e, w, p * p, w * w, q, p * p, p * p, q * q, 1,
-        m * q * p, m * q, m * q, m * p, m, m * q, m * p * q, m * q,
+        m * q * p, m * q, m * q, m * p, m, m * q, m * p * q, m * q, w * w, 3 * b * w, 1,
     ))  # fmt: skip
     return StateViews(
         s[k[0] : k[1]],  # clock
@@ -113,6 +116,9 @@ def state_views(s, n):
         s[k[26] : k[27]].reshape((m, q)),  # window_error
         s[k[27] : k[28]].reshape((m, p, q)),  # window_influence
         s[k[28] : k[29]].reshape((m, q)),  # window_variance
+        s[k[29] : k[30]].reshape((w, w)),  # beside
+        s[k[30] : k[31]].reshape((3, b, w)),  # beside_shared
+        s[k[31] : k[32]],  # beside_time
     )
 
 
@@ -161,7 +167,7 @@ def plan_views(whole, others, n):
     i, x = whole[8:], others[10:]
     a, b, e, p, q = n.parameters, n.bodies, n.elements, n.estimated, n.equations
     k = cuts((b + 1, n.channels, 2 * e, e, e, q, q, e, a, a, a, e, e))
-    h = cuts((b, b, q * e, e, a, q, p, p, p, p, p, p, q * b, e * b))
+    h = cuts((b, b, q * e, e, a, q, p, p, p, p, p, p, q * b, e * b, b))
     return Plan(
         i[k[0] : k[1]],  # first_channel
         i[k[1] : k[2]],  # has_offset
@@ -191,4 +197,5 @@ def plan_views(whole, others, n):
         x[h[11] : h[12]],  # scale
         x[h[12] : h[13]].reshape((q, b)),  # own_offset
         x[h[13] : h[14]].reshape((e, b)),  # crush_of_body
+        x[h[14] : h[15]],  # velocity_variance
     )

@@ -1,0 +1,113 @@
+"""Errors of the integrated motion in the covariance: `regressor_errors.py` as loops.
+
+The arrays of all three kinds of error come one after the other: shared (3, b, w), by_errors (3, q, b), with 0 the zero
+offset, 1 velocity and 2 displacement. Most bodies touch few equations: what is 0 in by_errors is passed over.
+"""
+
+import numpy as np
+from numba import njit
+
+from ..kinematics import FEWEST
+
+
+@njit(cache=True, inline="always")
+def sensors_of(plan, s, zero, density, dt):
+    """Fill (b,) the variance of each body's zero, and the spectral density of the noise that is integrated."""
+    count = s.count.max() if len(s.count) else 0.0
+    if count < FEWEST:
+        zero[:] = 0.0
+        density[:] = 0.0
+        return
+    for b in range(len(zero)):
+        zero[b] = s.squares[b] / count**2
+        density[b] = s.squares[b] / count * dt
+    for i in range(len(plan.equation_body)):
+        if plan.equation_body[i] < 0:
+            for b in range(len(zero)):
+                if plan.own_offset[i, b] != 0.0:
+                    zero[b] = s.force_squares[i] / count**2
+
+
+@njit(cache=True, inline="always")
+def known_of(zero, density, velocity, t, n):
+    """Fill n (b, 6) with the covariance of each body's errors: zz, zu, zd, uu, ud, dd."""
+    for b in range(len(zero)):
+        z, q, u = zero[b], density[b], velocity[b]
+        n[b, 0] = z
+        n[b, 1] = z * t
+        n[b, 2] = 0.5 * z * t * t
+        n[b, 3] = u + (z * t + q) * t
+        n[b, 4] = (u + (0.5 * z * t + 0.5 * q) * t) * t
+        n[b, 5] = (u + (0.25 * z * t + q / 3.0) * t) * t * t
+
+
+@njit(cache=True, inline="always")
+def move_on(s, time):
+    """C goes on to the time of this sample, s since the impact: u += z dt, d += u dt + z dt^2 / 2."""
+    dt = time - s.beside_time[0]
+    s.beside_time[0] = time
+    shared = s.beside_shared
+    for b in range(shared.shape[1]):
+        for j in range(shared.shape[2]):
+            z, u = shared[0, b, j], shared[1, b, j]
+            shared[1, b, j] = u + z * dt
+            shared[2, b, j] += (u + 0.5 * z * dt) * dt
+
+
+@njit(cache=True)
+def pass_on(s, gain, gradient, by_errors, n):
+    """S and C, in place, after theta += gain (y - gradient theta); gain (w, q), gradient (q, w), n as in `known_of`."""
+    w, q = gain.shape
+    bodies = by_errors.shape[2]
+    whole, shared = s.beside, s.beside_shared
+    c, v, pull = np.zeros((w, q)), np.zeros((q, q)), np.zeros((3, bodies, q))
+    for i in range(q):
+        for b in range(bodies):
+            h0, h1, h2 = by_errors[0, i, b], by_errors[1, i, b], by_errors[2, i, b]
+            if h0 == 0.0 and h1 == 0.0 and h2 == 0.0:
+                continue
+            pull[0, b, i] = h0 * n[b, 0] + h1 * n[b, 1] + h2 * n[b, 2]
+            pull[1, b, i] = h0 * n[b, 1] + h1 * n[b, 3] + h2 * n[b, 4]
+            pull[2, b, i] = h0 * n[b, 2] + h1 * n[b, 4] + h2 * n[b, 5]
+            for j in range(w):
+                c[j, i] += h0 * shared[0, b, j] + h1 * shared[1, b, j] + h2 * shared[2, b, j]
+    for i in range(q):  # Psi C H' enters v from both sides, once as it is and once through c
+        for k in range(q):
+            total = 0.0
+            for j in range(w):
+                total -= gradient[i, j] * c[j, k]
+            v[i, k] += total
+            v[k, i] += total
+            for b in range(bodies):
+                for kind in range(3):
+                    v[i, k] += by_errors[kind, k, b] * pull[kind, b, i]
+    for i in range(q):
+        for j in range(w):
+            psi = gradient[i, j]
+            if psi == 0.0:
+                continue
+            for b in range(bodies):
+                for kind in range(3):
+                    pull[kind, b, i] -= psi * shared[kind, b, j]
+    for i in range(q):
+        for j in range(w):
+            total = 0.0
+            for k in range(w):
+                total += whole[j, k] * gradient[i, k]
+            c[j, i] -= total
+            for k in range(q):
+                v[k, i] += gradient[k, j] * total
+    for i in range(q):
+        for j in range(w):
+            g = gain[j, i]
+            if g == 0.0:
+                continue
+            for k in range(w):
+                whole[j, k] += g * c[k, i]
+                whole[k, j] += g * c[k, i]
+            for h in range(q):
+                for k in range(w):
+                    whole[j, k] += g * v[i, h] * gain[k, h]
+            for b in range(bodies):
+                for kind in range(3):
+                    shared[kind, b, j] += g * pull[kind, b, i]
