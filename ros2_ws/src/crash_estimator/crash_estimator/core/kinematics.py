@@ -39,8 +39,8 @@ class Motion(NamedTuple):
     measured: np.ndarray  # (q,) left-hand side of each equation, NaN where not measured
     noise: np.ndarray  # (q,) variance of it before the impact: the sensors' noise; NaN where not known
     offset_variance: np.ndarray  # (b,) (m/s^2)^2 by which the removed zero offset may be wrong; 0 where not known
-    sensors: np.ndarray  # (2, b) m/s^2 or N, squared: noise of each body's measurement before the impact, and of its
-    # mean, the zero offset; of a fixed body that of the force on it; 0 where not known
+    sensors: np.ndarray  # (2, b) variance of each body's measured acceleration before the impact, and of its mean, the
+    # zero offset (of a fixed body that of the force on it); 0 where not known
     held: np.ndarray  # (b,) m/s^2, the last valid acceleration after the impact
     displacement_by: np.ndarray | None = None  # (b, n) its change with each of n estimated errors of channels
     velocity_by: np.ndarray | None = None  # (b, n)
@@ -225,9 +225,10 @@ class Kinematics:
         for row, body in self.balances:
             noise[row] = state.squares[body] / count
         each = state.squares / count
+        zero = each / count
         for row, _ in self.force_channels:
-            each[self.structure.equations[row]] = noise[row]
-        return noise, state.squares / count * (1.0 / count + dt / RECORD), np.array([each, each / count])
+            zero[self.structure.equations[row]] = noise[row] / count
+        return noise, each * (1.0 / count + dt / RECORD), np.array([each, zero])
 
 
 def _check_accelerations(structure: Structure) -> None:

@@ -17,8 +17,9 @@ counts it as noise states too small a sigma. With the gain G that a method has u
 so that the part S of theta's covariance that is due to x, and C = E[E x'], follow with N = E[x x'] by
 
     c = C H' - S Psi'       v = Psi S Psi' - Psi C H' - H C' Psi' + H N H'
-    S <- S + G c' + c G' + G v G'       C <- C + G (H N - Psi C)       C <- C F' between samples, x <- F x + noise
+    S <- S + G c' + c G' + G v G'       C <- C + G (H N - Psi C + D)   C <- C F' between samples, x <- F x + noise
 
+D = s^2 dt for u of the body whose equation it is, because the sample's noise e is integrated as well, and else 0.
 This is exact for a linear recursion (the covariance of a Schmidt filter for gains that are not its own: Bierman 1977,
 chapter VIII). N is known beforehand: with q = s^2 dt, the noise's spectral density,
 
@@ -89,6 +90,8 @@ class Consequence(NamedTuple):
         v = gradient @ s @ gradient.T - both - both.T + np.einsum("qbk,rbk->qr", known_seen, h)
         s = s + gain @ c.T + c @ gain.T + gain @ v @ gain.T
         pulled = known_seen - np.einsum("qw,wbk->qbk", gradient, shared)
+        if errors is not None:
+            pulled[:, :, 1] += h[:, :, 0] * errors.density
         return Consequence(0.5 * (s + s.T), shared + np.einsum("wq,qbk->wbk", gain, pulled), time)
 
 

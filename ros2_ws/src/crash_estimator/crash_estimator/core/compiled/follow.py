@@ -22,7 +22,7 @@ def follow(whole, others, state, last_row, times_ns, values, rows):
     n, method = size_of(whole), method_of(others)
     plan, s = plan_views(whole, others, n), state_views(state, n)
     p, q, e = n.estimated, n.equations, n.elements
-    by_errors, errors = np.zeros((3, q, n.bodies)), np.zeros((n.bodies, 6))
+    by_errors, errors = np.zeros((3, q, n.bodies)), np.zeros((n.bodies, 7))
     zero, density = np.zeros(n.bodies), np.zeros(n.bodies)
     clean, bodies = np.empty(n.channels), np.empty(n.bodies)
     lever, shift, per_unit = np.empty(e), np.empty(e), np.empty(n.parameters)

@@ -30,7 +30,7 @@ def sensors_of(plan, s, zero, density, dt):
 
 @njit(cache=True, inline="always")
 def known_of(zero, density, velocity, t, n):
-    """Fill n (b, 6) with the covariance of each body's errors: zz, zu, zd, uu, ud, dd."""
+    """Fill n (b, 7) with the covariance of each body's errors, zz, zu, zd, uu, ud, dd, and the density beside them."""
     for b in range(len(zero)):
         z, q, u = zero[b], density[b], velocity[b]
         n[b, 0] = z
@@ -38,6 +38,7 @@ def known_of(zero, density, velocity, t, n):
         n[b, 2] = 0.5 * z * t * t
         n[b, 3] = u + (z * t + q) * t
         n[b, 4] = (u + (0.5 * z * t + 0.5 * q) * t) * t
+        n[b, 6] = q
         n[b, 5] = (u + (0.25 * z * t + q / 3.0) * t) * t * t
 
 
@@ -56,7 +57,7 @@ def move_on(s, time):
 
 @njit(cache=True)
 def pass_on(s, gain, gradient, by_errors, n):
-    """S and C, in place, after theta += gain (y - gradient theta); gain (w, q), gradient (q, w), n as in `known_of`."""
+    """S and C, in place, after theta += gain (y - gradient theta); gain (w, q), gradient (q, w), n of `known_of`."""
     w, q = gain.shape
     bodies = by_errors.shape[2]
     whole, shared = s.beside, s.beside_shared
@@ -67,7 +68,7 @@ def pass_on(s, gain, gradient, by_errors, n):
             if h0 == 0.0 and h1 == 0.0 and h2 == 0.0:
                 continue
             pull[0, b, i] = h0 * n[b, 0] + h1 * n[b, 1] + h2 * n[b, 2]
-            pull[1, b, i] = h0 * n[b, 1] + h1 * n[b, 3] + h2 * n[b, 4]
+            pull[1, b, i] = h0 * (n[b, 1] + n[b, 6]) + h1 * n[b, 3] + h2 * n[b, 4]
             pull[2, b, i] = h0 * n[b, 2] + h1 * n[b, 4] + h2 * n[b, 5]
             for j in range(w):
                 c[j, i] += h0 * shared[0, b, j] + h1 * shared[1, b, j] + h2 * shared[2, b, j]
@@ -81,6 +82,7 @@ def pass_on(s, gain, gradient, by_errors, n):
             for b in range(bodies):
                 for kind in range(3):
                     v[i, k] += by_errors[kind, k, b] * pull[kind, b, i]
+                v[i, k] -= by_errors[1, k, b] * by_errors[0, i, b] * n[b, 6]
     for i in range(q):
         for j in range(w):
             psi = gradient[i, j]
