@@ -100,7 +100,7 @@ class Estimator:
     @staticmethod
     def _excited(regression: Regression) -> bool:
         measured = ~np.isnan(regression.measured)
-        return bool((regression.gradient[measured] != 0.0).any())
+        return bool((regression.gradient[measured][:, regression.active] != 0.0).any())
 
     def _clamp_events(self, before: np.ndarray, update: Update) -> tuple[Event, ...]:
         fresh = np.flatnonzero(update.clamped & ~before)

@@ -3,7 +3,8 @@
     y = measured - known,    Psi = d(prediction) / d(theta)
 
 A parameter that is known, or whose element is apart, has left Psi ("reduce" in figure 6.6); its value
-returns unchanged ("expand").
+returns unchanged ("expand"). One whose crush or rate is not known beyond its own error (`KNOWN_FROM`) stays in Psi and is
+held: a method takes it as it is, not as known.
 """
 
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from .actions import Actions
 from .contact import SpringLaw
 from .estimate import ParameterStatus
 from .kinematics import Motion
-from .regressor_errors import MotionErrors
+from .regressor_errors import KNOWN_FROM, MotionErrors
 from .structure import Parameter, Structure
 
 SHORTEST_CRUSH = 1e-3
@@ -31,9 +32,9 @@ class Regression(NamedTuple):
     """One sample for p parameters, q equations and e elements."""
 
     known: np.ndarray  # (q,) prediction by what is known
-    gradient: np.ndarray  # (q, p) Psi; zero columns for parameters that are not active
+    gradient: np.ndarray  # (q, p) Psi; zero columns for parameters that are known, or whose element is apart
     measured: np.ndarray  # (q,) NaN where there is no valid measurement
-    active: np.ndarray  # (p,) whether the parameter is estimated at this sample
+    active: np.ndarray  # (p,) whether the parameter is estimated at this sample; where not, its error is still counted
     walk: (
         np.ndarray
     )  # (p,) relative variance of a random walk: drift^2 times the e-folds of crush since the last sample
@@ -97,6 +98,7 @@ class Regressor:
         self.factors = [(k, element.factor) for k, element in enumerate(structure.elements) if element.factor]
         self.share = structure.force_to_equation
         self.element = np.array([p.element for p in parameters], dtype=int)
+        self.is_damping = np.array([p.unit == "N*s/m" for p in parameters], dtype=bool)
         self.of_element = np.equal.outer(np.arange(len(structure.elements)), self.element).astype(float)
         self.is_stiffness = np.array([p.is_stiffness for p in parameters], dtype=bool)
         self.further = None if structure.first_order else Further(structure)
@@ -144,13 +146,24 @@ class Regressor:
         if factor is not None:
             lever, shift = np.where(self.of_spring, factor[self.element] * lever, lever), factor * shift
         forces = Forces(self.of_element * lever, shift)
-        active = self.estimated & carries
+        errors = MotionErrors(
+            np.zeros((len(self.own_offset), len(self.velocity_variance), 3)),
+            motion.sensors[1], motion.sensors[0] * motion.dt, self.velocity_variance, motion.time,
+        )  # fmt: skip
+        of_crush, of_rate = errors.spread(self.crush_of_body)
+        vague = np.where(
+            self.is_stiffness,
+            (np.abs(law.lever) < KNOWN_FROM * of_crush)[self.element],
+            (np.abs(motion.rate) < KNOWN_FROM * of_rate)[self.element] & self.is_damping,
+        )
+        touched = self.estimated & carries
+        active = touched & ~vague
         known = self.share @ (forces.per_unit @ self.value + shift)
         measured = motion.measured
         if motion.applied is not None:
             lost = np.isnan(motion.applied)  # as where a measurement is
             known, measured = known + np.where(lost, 0.0, motion.applied), np.where(lost, np.nan, measured)
-        gradient = np.where(active, self.share @ forces.per_unit, 0.0)
+        gradient = np.where(touched, self.share @ forces.per_unit, 0.0)
         folds = np.abs(motion.rate) * motion.dt / np.maximum(np.abs(motion.crush), SHORTEST_CRUSH)
         walk = np.where(active & ~law.on_line[self.element], self.drift_squared * folds[self.element], 0.0)
         noise = np.maximum(np.where(np.isnan(self.noise), motion.noise, self.noise), QUIETEST**2)
@@ -168,10 +181,7 @@ class Regressor:
             Regression(
                 known, gradient, measured, active, walk, noise, motion.dt, motion.time,
                 self.own_offset + 0.5 * motion.time**2 * by_d + motion.time * by_u, motion.offset_variance,
-                MotionErrors(
-                    np.stack([self.own_offset, by_u, by_d], axis=-1), motion.sensors[1], motion.sensors[0] * motion.dt,
-                    self.velocity_variance, motion.time,
-                ),
+                errors._replace(gradient=np.stack([self.own_offset, by_u, by_d], axis=-1)),
             ),
             forces,
         )  # fmt: skip

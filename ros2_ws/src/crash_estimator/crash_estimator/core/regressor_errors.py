@@ -38,6 +38,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+KNOWN_FROM = 3.0
+"""Standard deviations of its own error that a crush, or a rate, must have for its coefficient to be estimated from it.
+
+What is integrated before an element is touched is error alone. A coefficient estimated from it goes to zero, and is sure
+of that; from 3 on what is lost by it is less than a tenth. Until then the coefficient is held at its latest value, and what may be
+wrong with that is counted as the error of the others (a parameter that is considered, Schmidt 1966)."""
+
 SMALLEST_SHARE = 0.05
 """Of a parameter's scale: a walk is a share of the value, and a stiffness near zero must be able to walk as well."""
 
@@ -50,6 +57,11 @@ class MotionErrors(NamedTuple):
     density: np.ndarray  # (b,) m^2/s^3: of the noise that is integrated
     velocity: np.ndarray  # (b,) (m/s)^2: variance of the initial velocity
     time: float  # s since the impact
+
+    def spread(self, crush_of_body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(e,) m and m/s: standard deviation of each element's crush and rate; crush_of_body (e, b)."""
+        n = self.covariance()
+        return np.sqrt(crush_of_body**2 @ n[:, 2, 2]), np.sqrt(crush_of_body**2 @ n[:, 1, 1])
 
     def covariance(self) -> np.ndarray:
         """(b, 3, 3) N."""

@@ -35,17 +35,18 @@ def follow(whole, others, state, last_row, times_ns, values, rows):
         time = times_ns[t] * 1e-9
         dt = move(plan, s, row, times_ns[t], values[t], clean, bodies)
         touch(plan, s, row, time, lever, shift)
+        sensors_of(plan, s, zero, density, dt)
+        known_of(zero, density, plan.velocity_variance, time, errors)
         excited = regress(
-            plan, s, row, n, dt, time, lever, shift, per_unit, by_errors, known, gradient, active, walk, learnt
+            plan, s, row, n, dt, time, lever, shift, per_unit, by_errors, errors, known, gradient, active, walk, learnt
         )
         before[:] = s.theta
         clamped[:] = 0.0
         row.rewinds[0] = 0.0
         if dt > 0.0 and excited:
-            sensors_of(plan, s, zero, density, dt)
-            if n.offsets:
-                for b in range(n.offsets):
-                    zero[b] = 0.0 if s.squares[b] > 0.0 else zero[b]
+            for b in range(n.offsets):
+                if s.squares[b] > 0.0:  # its zero is estimated
+                    zero[b] = 0.0
             known_of(zero, density, plan.velocity_variance, time, errors)
             move_on(s, time)
             if method.is_kalman:

@@ -3,8 +3,8 @@
 The errors of the equations are independent (R2 is diagonal), so their updates may be made in turn, each with
 a scalar instead of a matrix to invert:  s = psi P psi' + r,  L = P psi' / s,  P = (I - L psi) P (I - L psi)' + L r L'.
 
-A parameter that is held has left psi, and its row of L is 0. With L = K - H, K the gain of all and H its held rows,
-that is
+The row of L of a parameter that is held is 0; where it is held at a bound it has left psi as well. With L = K - H, K the
+gain of all and H its held rows, that is
 
     P = P - s K K' + s H H'
 
@@ -42,7 +42,7 @@ def kalman_update(theta, factors, noise, gradient, target, active, lower, upper,
         gain[:, :] = 0.0
         for i in range(len(target)):
             if target[i] == target[i]:
-                _one_equation(theta, factors, noise[i], gradient[i], target[i], free, psi, spread, gain[:, i])
+                _one_equation(theta, factors, noise[i], gradient[i], target[i], free, clamped, psi, spread, gain[:, i])
         again = False
         if constrained:
             for j in range(len(lower)):
@@ -56,12 +56,12 @@ def kalman_update(theta, factors, noise, gradient, target, active, lower, upper,
 
 
 @njit(cache=True, inline="always")
-def _one_equation(theta, factors, r, gradient, target, free, psi, spread, gain):
+def _one_equation(theta, factors, r, gradient, target, free, clamped, psi, spread, gain):
     """spread: first P psi', then of that only what is held."""
     error, last = target, -1
     for j in range(len(theta)):
         error -= gradient[j] * theta[j]
-        psi[j] = free[j] * gradient[j]
+        psi[j] = 0.0 if clamped[j] else gradient[j]
     s = observe(factors, psi, r, spread)
     if s == 0.0:  # neither noise nor anything to learn
         return

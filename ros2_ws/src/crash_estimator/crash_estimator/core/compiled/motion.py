@@ -6,6 +6,7 @@ from numba import njit
 from ..contact import REVERSAL
 from ..estimate import ElementState
 from ..kinematics import FEWEST, RATE_SMOOTHING
+from ..regressor_errors import KNOWN_FROM
 from ..regression import QUIETEST, SHORTEST_CRUSH
 
 LOADING, UNLOADING, APART = (float(state) for state in ElementState)
@@ -105,7 +106,9 @@ def touch(plan, s, row, time, lever, shift):
 
 
 @njit(cache=True, inline="always")
-def regress(plan, s, row, n, dt, time, lever, shift, per_unit, by_errors, known, gradient, active, walk, noise):
+def regress(
+    plan, s, row, n, dt, time, lever, shift, per_unit, by_errors, errors, known, gradient, active, walk, noise
+):  # fmt: skip
     """Fill the regression of this sample -> whether it says anything about an estimated parameter.
 
     per_unit (all,) is each parameter's force for one unit of it, by_errors (3, q, b) each equation's change for an
@@ -133,10 +136,18 @@ def regress(plan, s, row, n, dt, time, lever, shift, per_unit, by_errors, known,
             for i in range(q):
                 known[i] += plan.share[i, k] * per_unit[j] * plan.value[j]
             continue
-        active[slot] = 1.0 if carries else 0.0
-        walk[slot] = 0.0
+        walk[slot] = active[slot] = 0.0
         if not carries:
             continue
+        spread, size = 0.0, abs(lever[k] if plan.is_stiffness[j] else row.rate[k])
+        for end in range(2):
+            b = plan.ends[k, end]
+            spread += plan.crush_of_body[k, b] ** 2 * errors[b, 5 if plan.is_stiffness[j] else 3]
+        if size < KNOWN_FROM * np.sqrt(spread):
+            for i in range(q):
+                gradient[i, slot] = plan.share[i, k] * per_unit[j]
+            continue
+        active[slot] = 1.0
         on_line = plan.unloading[k] > 0.0 and row.state[k] == UNLOADING
         if not on_line:
             folds = abs(row.rate[k]) * dt / max(abs(row.crush[k]), SHORTEST_CRUSH)

@@ -84,6 +84,9 @@ def correct(
             if active[j] and valid[i] and gradient[i, j] != 0.0:
                 excited[j] = 1.0
     multiply(weight, gradient, weighted)
+    for i in range(q):
+        for j in range(p):
+            weighted[i, j] *= excited[j]
     root = np.sqrt(forgetting)
     for j in range(p):
         fade_j = root if excited[j] else 1.0
@@ -91,7 +94,7 @@ def correct(
             fade_k = root if excited[k] else 1.0
             gained = 0.0
             for i in range(q):
-                gained += gradient[i, j] * weighted[i, k]
+                gained += excited[j] * gradient[i, j] * weighted[i, k]
             s.information[j, k] = fade_j * s.information[j, k] * fade_k + gained
     free = excited.copy()
     clamped[:] = 0.0

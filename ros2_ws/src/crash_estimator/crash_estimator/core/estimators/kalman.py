@@ -84,8 +84,9 @@ class Kalman:
             root, both = prior, np.concatenate([theta, offsets])
             gains.clear()
             moved = np.concatenate([free, always])
+            counted = np.concatenate([free | ~regression.active, always])  # all but those held at a bound
             for psi_all, y, r in equations:
-                seen = np.where(moved, psi_all, 0.0) @ root  # psi S
+                seen = np.where(counted, psi_all, 0.0) @ root  # psi S
                 gain = np.where(moved, root @ seen / (r + seen @ seen), 0.0)
                 both = both + gain * (y - psi_all @ both)
                 root = np.column_stack([root - np.outer(gain, seen), gain * np.sqrt(r)])

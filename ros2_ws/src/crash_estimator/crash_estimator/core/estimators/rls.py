@@ -126,7 +126,8 @@ class Rls:
         weight *= np.sqrt(np.multiply.outer(trust * np.ones(len(weight)), trust * np.ones(len(weight))))
         excited = regression.active & (regression.gradient[valid] != 0.0).any(axis=0)
         fade = np.where(excited, np.sqrt(forgetting), 1.0)
-        gained = regression.gradient.T @ weight @ regression.gradient
+        of_active = np.where(excited, regression.gradient, 0.0)
+        gained = of_active.T @ weight @ of_active
         information = fade[:, None] * state.information * fade + gained
         gain = np.zeros(regression.gradient.shape[::-1])
 
