@@ -81,7 +81,7 @@ class Estimator:
         unloading = self.regressor.unloading(state.update.theta)
         damping = state.update.theta[self.regressor.damping_index]
         contact, law, events = self.contact.step(state.contact, motion, stiffness, unloading, damping)
-        regression, forces = self.regressor.make(motion, law, state.update.theta)
+        regression, forces = self.regressor.make(motion, law, state.update.theta, state.update.variance)
         method, update = state.method, state.update
         if motion.dt > 0.0 and self._excited(regression):
             method, update = self.method.update(method, regression)

@@ -135,8 +135,11 @@ class Regressor:
             return coefficient.drift
         return DRIFT[coefficient.shape] if parameter.is_stiffness else 0.0
 
-    def make(self, motion: Motion, law: SpringLaw, theta: np.ndarray) -> tuple[Regression, Forces]:
-        """theta (p,): the latest values, for what depends on them: the forces' change with the zero offsets' errors."""
+    def make(
+        self, motion: Motion, law: SpringLaw, theta: np.ndarray, variance: np.ndarray | float = 0.0
+    ) -> tuple[Regression, Forces]:
+        """theta (p,): the latest values, for what depends on them: the forces' change with errors of the motion;
+        variance (p,) of each, for the same."""
         carries = law.carries[self.element]
         lever = np.where(self.is_stiffness, law.lever[self.element], np.where(carries, motion.rate[self.element], 0.0))
         shift = law.shift
@@ -169,11 +172,13 @@ class Regressor:
         noise = np.maximum(np.where(np.isnan(self.noise), motion.noise, self.noise), QUIETEST**2)
         slopes = self._slopes(law, theta, factor)
         by_d, by_u = (-self.share @ (slope[:, None] * self.crush_of_body) for slope in slopes)
+        likely = self._slopes(law, np.copysign(np.sqrt(theta**2 + variance), theta), factor)
+        likely_d, likely_u = (-self.share @ (slope[:, None] * self.crush_of_body) for slope in likely)
         if self.actions is not None:
             static = np.where(self.of_spring, forces.per_unit, 0.0) @ theta[: len(lever)] + shift
             per_unit = self.actions.forces(motion, law, static)
             known, gradient, heavier = self.actions.added(known, gradient, motion, per_unit, slopes, theta)
-            by_d, by_u = heavier[:, None] * by_d, heavier[:, None] * by_u
+            by_d, by_u, likely_d, likely_u = (heavier[:, None] * by for by in (by_d, by_u, likely_d, likely_u))
             active = np.concatenate([active, self.actions.estimated & (gradient[:, len(lever) :] != 0.0).any(axis=0)])
             walk = np.concatenate([walk, np.zeros(len(per_unit[0]))])
             forces = Forces(np.hstack([forces.per_unit, per_unit]), shift)
@@ -181,7 +186,7 @@ class Regressor:
             Regression(
                 known, gradient, measured, active, walk, noise, motion.dt, motion.time,
                 self.own_offset + 0.5 * motion.time**2 * by_d + motion.time * by_u, motion.offset_variance,
-                errors._replace(gradient=np.stack([self.own_offset, by_u, by_d], axis=-1)),
+                errors._replace(gradient=np.stack([self.own_offset, likely_u, likely_d], axis=-1)),
             ),
             forces,
         )  # fmt: skip

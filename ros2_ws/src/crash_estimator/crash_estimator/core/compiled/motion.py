@@ -156,26 +156,28 @@ def regress(
             gradient[i, slot] = plan.share[i, k] * per_unit[j]
             if gradient[i, slot] != 0.0 and row.measured[i] == row.measured[i]:
                 excited = True
+    gradient[:, n.estimated :] = plan.own_offset[:, : n.offsets]
     by_errors[0] = plan.own_offset
     by_errors[1:] = 0.0
     for k in range(len(shift)):
-        slope = 0.0
-        if row.state[k] == UNLOADING and plan.unloading[k] > 0.0:
-            slope = plan.unloading[k]
-        elif row.state[k] != APART:
+        if row.state[k] == APART:
+            continue
+        slope = likely_slope = plan.unloading[k]
+        if row.state[k] != UNLOADING or not plan.unloading[k] > 0.0:
             slope = value_of(plan.value, plan.slot, s.theta, plan.stiffness[k])
-        damping = value_of(plan.value, plan.slot, s.theta, plan.damping[k]) if row.state[k] != APART else 0.0
+            likely_slope = likely(slope, plan.slot, s, plan.stiffness[k])
+        damping = value_of(plan.value, plan.slot, s.theta, plan.damping[k])
+        likely_damping = likely(damping, plan.slot, s, plan.damping[k])
         for end in range(2):
             b = plan.ends[k, end]
             sign = plan.crush_of_body[k, b]
             if sign != 0.0:
                 for i in range(q):
-                    by_errors[1, i, b] -= plan.share[i, k] * damping * sign
-                    by_errors[2, i, b] -= plan.share[i, k] * slope * sign
-    for i in range(q):
-        for b in range(n.offsets):
-            moved = 0.5 * time**2 * by_errors[2, i, b] + time * by_errors[1, i, b]
-            gradient[i, n.estimated + b] = by_errors[0, i, b] + moved
+                    by_errors[1, i, b] -= plan.share[i, k] * likely_damping * sign
+                    by_errors[2, i, b] -= plan.share[i, k] * likely_slope * sign
+                    if b < n.offsets:
+                        moved = 0.5 * time**2 * slope + time * damping
+                        gradient[i, n.estimated + b] -= plan.share[i, k] * moved * sign
     return excited
 
 
@@ -183,3 +185,10 @@ def regress(
 def value_of(value, slot, theta, j):
     """The parameter's known or latest value. (It takes arrays: to hand on all of a plan takes a microsecond.)"""
     return value[j] if slot[j] < 0 else theta[slot[j]]
+
+
+@njit(cache=True, inline="always")
+def likely(value, slot, s, j):
+    """The parameter's root mean square, with the sign of its latest value."""
+    k = slot[j]
+    return value if k < 0 else np.copysign(np.sqrt(value**2 + s.covariance[k, k] + s.beside[k, k]), value)

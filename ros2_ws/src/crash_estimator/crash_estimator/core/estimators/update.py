@@ -42,6 +42,11 @@ class Update(NamedTuple):
     extra_std: tuple[float, ...] = ()  # of each; empty: none is known
     beside: np.ndarray | float = 0.0  # (p, p) of theta, what is due to errors of the motion and to the lag
 
+    @property
+    def variance(self) -> np.ndarray:
+        """(p,) of theta, all together."""
+        return np.diagonal(self.covariance + self.beside)
+
 
 def theta_settings(structure: Structure) -> Theta:
     """A stated standard deviation is kept; otherwise it is `INITIAL_STD` of the parameter's order of magnitude."""
