@@ -39,6 +39,13 @@ def batch(recording, weights, upto):
     return theta, np.linalg.inv(information)
 
 
+def zero_error(recording, psi, gain):
+    """What a zero wrong by its own standard deviation, a step on every sample, has done to theta: K sum of psi' w, squared."""
+    before = recording.values[recording.time_ns < 0, 0]
+    moved = gain @ psi
+    return np.outer(moved, moved) * _learnt_noise(before) / len(before)
+
+
 def test_kalman_without_process_noise_is_regularised_least_squares_at_every_sample():
     recording = oscillator_recording(noise=NOISE)
     structure = oscillator(
@@ -50,6 +57,9 @@ def test_kalman_without_process_noise_is_regularised_least_squares_at_every_samp
         # the noise that the filter has learnt before the impact, from the first innovation's variance
         variance = estimates[51].innovation_covariance[0, 0] - _prior_spread(recording, 51)
         theta, covariance = batch(recording, np.full(len(recording), 1.0 / variance), k)
+        after = (recording.time_ns > 0) & (np.arange(len(recording)) <= k)
+        psi = -recording.values[after, 1:].sum(axis=0) / 10.0
+        covariance = covariance + zero_error(recording, psi / variance, covariance)
         assert_allclose(estimates[k].parameters, theta, rtol=1e-7)
         assert_allclose(estimates[k].covariance, covariance, rtol=1e-6, atol=1e-9 * covariance.max())
     assert_allclose(variance, before.var(), rtol=0.2)
@@ -83,6 +93,7 @@ def test_rls_with_forgetting_one_is_weighted_least_squares_at_every_sample():
         psi = -recording.values[: k + 1, 1:] / 10.0
         noise = (psi.T * (weights**2 * variances)[: k + 1]) @ psi  # the covariance of S theta, and so S^-1 (...) S^-1
         covariance = inverse @ (np.diag([1.0e4**-2, 100.0**-2]) + noise) @ inverse
+        covariance = covariance + zero_error(recording, weights[: k + 1] @ psi, inverse)
         assert_allclose(estimates[k].covariance, covariance, rtol=1e-6, atol=1e-9 * covariance.max())
 
 

@@ -29,15 +29,14 @@ def product(factors):
 def update(theta, factors, noise, psi, target, active):
     """By the compiled form, in place, without bounds."""
     bounds = -UNBOUNDED[: len(theta)], UNBOUNDED[: len(theta)]
-    kalman_update(theta, factors, noise, psi, target, active, *bounds, False, np.zeros(len(theta)))
+    kalman_update(theta, factors, noise, psi, target, active, *bounds, False, np.zeros(len(theta)), np.zeros(psi.shape[::-1]))
 
 
 def joseph(theta, covariance, noise, psi, target, active):
-    """The update as it is written, in the numbers given: of all equations in turn, of the active parameters."""
+    """The update as it is written, in the numbers given: of all equations in turn; what is not active counts as unknown, and is held."""
     for row, y, r in zip(psi, target, noise):
-        seen = row * active
-        gain = active * (covariance @ seen) / (r + seen @ covariance @ seen)
-        lessen = np.eye(len(theta), dtype=int) - np.outer(gain, seen)
+        gain = active * (covariance @ row) / (r + row @ covariance @ row)
+        lessen = np.eye(len(theta), dtype=int) - np.outer(gain, row)
         theta = theta + gain * (y - row @ theta)
         covariance = lessen @ covariance @ lessen.T + r * np.outer(gain, gain)
     return theta, covariance

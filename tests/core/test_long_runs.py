@@ -37,12 +37,12 @@ def check(covariance):
 def test_a_million_compiled_steps(drift, steps):
     psi, noise, target = gradients(), np.array([1.0, 1e-4]), np.array([3.0, np.nan])
     theta, factors = SCALE.copy(), np.diag(SCALE**2)
-    active, clamped, bound, unit = np.ones(3), np.zeros(3), np.full(3, np.inf), np.empty(3)
+    active, clamped, bound, unit, gain = np.ones(3), np.zeros(3), np.full(3, np.inf), np.empty(3), np.empty((3, 2))
     for k in range(steps):
         for j in range(3 if drift else 0):
             widen(factors, (drift * SCALE[j]) ** 2, j, unit)
         target[1] = np.nan if k % 7 else 0.01  # now and then a dropout
-        kalman_update(theta, factors, noise, psi[k % len(psi)], target, active, -bound, bound, False, clamped)
+        kalman_update(theta, factors, noise, psi[k % len(psi)], target, active, -bound, bound, False, clamped, gain)
         if k % 100_000 == 0:
             check(covariance_of(factors))
     check(covariance_of(factors))

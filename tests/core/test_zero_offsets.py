@@ -38,13 +38,17 @@ def test_stiffness_damping_and_offset_are_those_of_batch_least_squares(compiled)
     start = np.array([1.5e4, 0.0, 0.0])
     pull = gradient.T @ (acceleration[after] - zero - gradient @ start) / NOISE**2
     expected, covariance = start + np.linalg.solve(precision, pull), np.linalg.inv(precision)
+    # the filter allows the zero more than its own error, for what the noise moves; here nothing is integrated
+    by_zero = covariance[:, 2] / variance
+    surplus = np.mean((acceleration[before] - running) ** 2) * recording.sample_period / RECORD
+    covariance = covariance - surplus * np.outer(by_zero, by_zero)
     assert_allclose(last.parameters, expected[:2], rtol=1e-8, atol=1e-6)
     assert_allclose(last.covariance, covariance[:2, :2], rtol=1e-6, atol=1e-9)
     assert_allclose(last.predicted, gradient[-1] @ expected, rtol=1e-8)
 
 
 def test_the_dummy_s_stiffnesses_lie_within_their_sigmas():
-    """Crush integrated from wrong zeros: within 1.96 sigma for 90 % of the loaded time, as no filter without is."""
+    """Crush integrated from wrong zeros: within 1.96 sigma for 90 % of the loaded time, estimated or only counted."""
     structure = load_model("side_dummy")
     inside = {offsets: [] for offsets in (True, False)}
     for seed in range(20, 26):
@@ -52,7 +56,7 @@ def test_the_dummy_s_stiffnesses_lie_within_their_sigmas():
         for offsets, shares in inside.items():
             estimator = make_estimator(structure, recording.test, "constrained_kalman", offsets=offsets)
             shares.append(share_inside(truth, estimator, recording, end=0.06))
-    assert np.mean(inside[True]) > 0.9 > 0.8 > np.mean(inside[False])
+    assert np.mean(inside[True]) > 0.9 and np.mean(inside[False]) > 0.9
 
 
 def share_inside(truth, estimator, recording, end: float) -> float:

@@ -63,7 +63,8 @@ def test_filterpy_makes_the_same_step(problem):
     theta, factors = problem.initial.copy(), np.diag(problem.std**2)
     factors += np.diag(problem.walk[k] * np.maximum(np.abs(theta), 0.05 * problem.scale) ** 2)
     bounds, sample = np.full(len(theta), np.inf), (problem.psi[k], problem.target[k], problem.active[k])
-    kalman_update(theta, factors, problem.noise, *sample, -bounds, bounds, True, np.zeros(len(theta)))
+    gain = np.zeros((len(theta), len(problem.noise)))
+    kalman_update(theta, factors, problem.noise, *sample, -bounds, bounds, True, np.zeros(len(theta)), gain)
     assert kalman.x.shape == (len(theta), 1)  # a flat z would have made it a square
     assert_allclose(kalman.x[:, 0], theta, rtol=1e-6)
 

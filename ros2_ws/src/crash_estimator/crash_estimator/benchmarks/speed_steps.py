@@ -26,12 +26,12 @@ SETTINGS = {"forgetting": 0.98, "m": 5, "cr": 3.0, "error_limit": 2.58, "rewinds
 def _filter(  # noqa: PLR0913 - compiled: arrays only
     theta, factors, noise, psi, target, walk, active, lower, upper, scale, smallest, clamped
 ):  # fmt: skip
-    unit = np.empty(len(theta))
+    unit, gain = np.empty(len(theta)), np.empty((len(theta), len(noise)))
     for t in range(len(psi)):
         for j in range(len(theta)):
             if walk[t, j] > 0.0:
                 widen(factors, walk[t, j] * max(abs(theta[j]), smallest * scale[j]) ** 2, j, unit)
-        kalman_update(theta, factors, noise, psi[t], target[t], active[t], lower, upper, True, clamped)
+        kalman_update(theta, factors, noise, psi[t], target[t], active[t], lower, upper, True, clamped, gain)
 
 
 def filtered(problem: Problem) -> np.ndarray:
@@ -56,8 +56,8 @@ def _kalman_calls(structure, recording, problem: Problem) -> Iterator[Row]:
     k = len(problem.psi) // 2
     theta, factors, clamped = problem.initial.copy(), np.diag(problem.std**2), np.zeros(len(problem.initial))
     sample = (problem.psi[k].copy(), problem.target[k].copy(), problem.active[k].copy())
-    bounds = problem.lower, problem.upper
-    alone = per_call(lambda: kalman_update(theta, factors, problem.noise, *sample, *bounds, True, clamped))
+    bounds, gain = (problem.lower, problem.upper), np.zeros((len(theta), len(problem.noise)))
+    alone = per_call(lambda: kalman_update(theta, factors, problem.noise, *sample, *bounds, True, clamped, gain))
     reference = filterpy_step(problem, k)
     theirs = per_call(reference) if reference else None
     said = f"filterpy {microseconds(theirs)}" if theirs else "filterpy is not installed"

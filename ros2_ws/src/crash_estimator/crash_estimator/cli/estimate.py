@@ -1,5 +1,6 @@
 """`estimate RECORDING --model M --method mrls`: fold a recording through an estimator and print what it found."""
 
+import argparse
 import sys
 
 from crash_replay.fault import guarded
@@ -20,6 +21,12 @@ def _main() -> None:
     estimate(arguments)
 
 
+def _passes(text: str) -> int:
+    if not (text.isdigit() and 1 <= int(text) <= 1000):
+        raise argparse.ArgumentTypeError(f"passes are a whole number from 1 to 1000, got {text!r}")
+    return int(text)
+
+
 def _parser() -> Parser:
     parser = Parser(prog="estimate", description=__doc__)
     parser.add_argument("bag", metavar="RECORDING", help=RECORDING)
@@ -31,6 +38,10 @@ def _parser() -> Parser:
         action="store_true",
         help="find the masses that go with the accelerometers first, the other parameters with them",
     )
+    parser.add_argument(
+        "--passes", metavar="N", type=_passes, default=10,
+        help="gauss_newton goes over the record until it settles, N times at most; 1: once, as a node does; default 10",
+    )  # fmt: skip
     add_effects_option(parser)
     parser.add_argument("--json", metavar="FILE", help="write everything that was found")
     return parser

@@ -1,6 +1,7 @@
 """`estimate`: a recording folded through an estimator, and what it found."""
 
 import argparse
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,8 @@ from ...core.derived_motion import with_accelerations
 from ...core.errors import EquationError, equation_errors
 from ...core.estimate import Description, ElementState, Estimate, ParameterStatus
 from ...core.fold import run
-from ...core.methods import make_estimator
+from ...core.methods import AnyEstimator, make_estimator
+from ...core.passes import repeats, settle
 from ...model_file import load_model
 from ...tables import besides_table, error_table, known_effects_table, never_touches, parameter_table
 from ..common import check_written, effects_of, parse_settings, read_crash, write_json
@@ -23,11 +25,17 @@ def estimate(arguments: argparse.Namespace) -> None:
     structure = load_model(arguments.model, effects)
     structure, (recording,) = with_accelerations(structure, [read_crash(arguments.bag)])
     settings = parse_settings(arguments.set) | ({"effective_mass": True} if arguments.effective_mass else {})
-    estimator = make_estimator(structure, recording.test, arguments.method, effects=effects, **settings)
-    estimates = run(estimator, recording.samples())
+
+    def make(**start: Any) -> AnyEstimator:
+        return make_estimator(structure, recording.test, arguments.method, effects=effects, **settings, **start)
+
+    estimator = make()
+    passes = settle(lambda start: make(start=start), recording, arguments.passes) if repeats(estimator) else None
+    estimates = passes.estimates if passes else run(estimator, recording.samples())
     description, errors = estimator.description, equation_errors(estimator.description, estimates)
     if arguments.json:  # files before words: `| head` ends this at a line that nobody reads
-        write_json(arguments.json, as_json(recording, description, estimates, errors))
+        content = as_json(recording, description, estimates, errors)
+        write_json(arguments.json, content | ({"passes": passes.as_json()} if passes else {}))
     say(f"{recording.test.id}: {len(recording)} samples, model {description.model}, method {description.method}\n")
     say(f"{parameter_table(description, estimates)}\n")
     if known := known_effects_table(structure.effects, effects, description):
@@ -36,6 +44,8 @@ def estimate(arguments: argparse.Namespace) -> None:
     for k, name in enumerate(description.elements):
         if all(estimate.state[k] == ElementState.APART for estimate in estimates):
             say(f"\n{never_touches(name)}")
+    if passes:
+        say(f"\n{passes.text}")
     if description.extra:
         say(f"\n{besides_table(description, estimates[-1])}")
 

@@ -89,8 +89,8 @@ def _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped):
             status = UNLOADS
         row.status[j] = status
     for j in range(n.estimated):
-        for h in range(n.estimated):
-            row.covariance[j, h] = s.covariance[j, h] + s.beside[j, h]
+        for h in range(j + 1):
+            row.covariance[j, h] = row.covariance[h, j] = s.covariance[j, h] + s.beside[j, h]
     for i in range(q):
         predicted = expected = known[i]
         spread = 0.0

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..estimate import Event
 from ..regression import Regression
 from ..regressor_errors import MotionErrors
 from ..structure import ModelError
@@ -157,7 +158,9 @@ class GaussNewton:
         longest = max(max(order) for order in self.orders(equations))
         given, passed = (None if r.errors is None else r.errors.gradient for r in (regression, wide))
         past = (Past(target, regression.gradient, error, filtered, given, passed), *state.past)[:longest]
+        begun = learning & ~state.learning & ~np.array([p + q == 0 for p, q in self.orders(equations)])
         update = update._replace(
+            events=update.events + tuple(self._begins(k, regression.time) for k in np.flatnonzero(begun)),
             beside=update.beside[:parameters, :parameters],
             theta=rls.theta[:parameters],
             covariance=update.covariance[:parameters, :parameters],
@@ -180,6 +183,15 @@ class GaussNewton:
         limit = self.known_to + np.count_nonzero(regression.active) * (1.0 - self._forgetting(regression.dt))
         told = psi**2 @ self.settings.std**2 > noise
         return state.learning | (told & (spread < limit * noise))
+
+    @staticmethod
+    def _begins(equation: int, time: float) -> Event:
+        """What one pass is worth: the samples before were weighed as if theirs was not the noise of the model."""
+        text = (
+            f"noise model of equation {equation + 1}: learnt from {time * 1e3:.1f} ms on; in this pass the samples before "
+            f"have counted {TRUST:.0%} (`estimate` goes over a record again until it settles)"
+        )
+        return Event("orders", f"equation {equation + 1}", TRUST, text)
 
     def _forgetting(self, dt: float) -> float:
         return self.forgetting if self.forgetting is not None else float(np.exp(-dt / self.memory))

@@ -9,14 +9,6 @@ from ..estimate import Event
 from ..structure import Structure
 
 
-INITIAL_STD = 3.0
-"""Of a parameter whose initial value has no stated standard deviation, in its orders of magnitude (`Parameter.scale`).
-
-An initial value is no more than a guess. With 1, a door that is six times as stiff as its model begins with a misfit of
-5 sigma, which the estimate keeps for its first 10 mm of crush while its sigma says otherwise; with 3 it is 2 sigma. With 10
-coverage is the same (side_dummy, 40 seeds: docs/coverage.md)."""
-
-
 class Theta(NamedTuple):
     """The parameter vector's settings, all (p,)."""
 
@@ -49,10 +41,10 @@ class Update(NamedTuple):
 
 
 def theta_settings(structure: Structure) -> Theta:
-    """A stated standard deviation is kept; otherwise it is `INITIAL_STD` of the parameter's order of magnitude."""
+    """A stated standard deviation is kept; otherwise the initial value may be wrong by its order of magnitude."""
     parameters = structure.parameters
     stds = [
-        0.0 if not p.coefficient.estimated else INITIAL_STD * p.scale if p.coefficient.std is None else p.coefficient.std
+        0.0 if not p.coefficient.estimated else p.scale if p.coefficient.std is None else p.coefficient.std
         for p in parameters
     ]
     return Theta(
