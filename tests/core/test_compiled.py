@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.core.compiled.layout import row_fields, state_fields
-from crash_estimator.core.compiled.plan import flat, make_method_plan
 from crash_estimator.core.compiled.linear import invert
+from crash_estimator.core.compiled.plan import flat, make_method_plan
 from crash_estimator.core.compiled.views import (
     RowViews,
     StateViews,

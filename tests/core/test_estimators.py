@@ -40,7 +40,7 @@ def batch(recording, weights, upto):
 
 
 def zero_error(recording, psi, gain):
-    """What a zero wrong by its own standard deviation, a step on every sample, has done to theta: K sum of psi' w, squared."""
+    """What a zero wrong by its own standard deviation, alike at all samples, has done to theta, squared."""
     before = recording.values[recording.time_ns < 0, 0]
     moved = gain @ psi
     return np.outer(moved, moved) * _learnt_noise(before) / len(before)
@@ -72,7 +72,10 @@ def _prior_spread(recording, k):
 
 def test_rls_with_forgetting_one_is_weighted_least_squares_at_every_sample():
     recording = oscillator_recording(noise=NOISE)
-    estimates = estimates_of("rls", recording, forgetting=1.0)
+    structure = oscillator(
+        stiffness=Coefficient(1.0e4, True, std=1.0e4, drift=0.0), damping=Coefficient(0.0, True, std=100.0)
+    )
+    estimates = estimates_of("rls", recording, structure, forgetting=1.0)
     # Ljung's weights 1 / Lambda_t, recomputed from the published innovations: gamma = 1/2, 1/3, ...
     before = recording.values[recording.time_ns < 0, 0]
     weights, gamma, error_covariance = np.zeros(len(recording)), 1.0, None

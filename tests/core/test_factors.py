@@ -29,11 +29,16 @@ def product(factors):
 def update(theta, factors, noise, psi, target, active):
     """By the compiled form, in place, without bounds."""
     bounds = -UNBOUNDED[: len(theta)], UNBOUNDED[: len(theta)]
-    kalman_update(theta, factors, noise, psi, target, active, *bounds, False, np.zeros(len(theta)), np.zeros(psi.shape[::-1]))
+    kalman_update(
+        theta, factors, noise, psi, target, active, *bounds, False, np.zeros(len(theta)), np.zeros(psi.shape[::-1])
+    )
 
 
 def joseph(theta, covariance, noise, psi, target, active):
-    """The update as it is written, in the numbers given: of all equations in turn; what is not active counts as unknown, and is held."""
+    """The update as it is written, in the numbers given, of all equations in turn.
+
+    What is not active is held, and counts as unknown.
+    """
     for row, y, r in zip(psi, target, noise):
         gain = active * (covariance @ row) / (r + row @ covariance @ row)
         lessen = np.eye(len(theta), dtype=int) - np.outer(gain, row)

@@ -1,27 +1,24 @@
-"""`coverage`: how often the truth lies inside the stated 95 %, for every method that states a sigma: docs/coverage.md.
+"""How often the truth lies inside the stated 95 %, for every method that states a sigma; `coverage_page` prints it.
 
 Tests are simulated, their crush integrated from noisy accelerometers whose zero is known from the samples before the
-impact alone. A draw is one test with one seed; it is looked at where an element loads and its crush is over `LEAST_CRUSH`.
+impact alone. They are looked at where an element loads and its crush is over `LEAST_CRUSH`.
 """
 
-import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from crash_replay.fault import guarded
-from crash_replay.gravity import G
-from crash_replay.recording import Recording
-from crash_replay.said import Parser, say
+from crash_replay.recording import Recording, Test
 from crash_replay.synthetic.curves import constant
+from crash_replay.synthetic.forces import Spring
 from crash_replay.synthetic.recordings import BUILDERS
 from crash_replay.synthetic.scenario import Scenario, Truth, record
 from crash_replay.synthetic.sensors import read
 
+from ..core.compiled.estimator import CompiledEstimator
 from ..core.methods import make_estimator
 from ..core.structure import Structure
 from ..model_file import load_model
@@ -37,12 +34,14 @@ TESTS = {  # recording: model
 NOISES = (0.5, 1.0, 2.0, 3.0)
 """g, of the accelerometers: one after the other, seed by seed."""
 LEAST_CRUSH, LEAST_SHARE = 0.010, 0.3
-"""m, and share of the element's largest crush where that is smaller: below it a spring's force is small beside the noise."""
+"""m, and share of the element's largest crush where that is smaller: below it a spring's force is small beside the
+noise."""
 INSTANTS = 5
 """In each element's time of loading beyond that, evenly from its first sample to its last."""
-COMPILED = True
 LIMIT = 1.96
 """Standard deviations that a normal error stays within in 95 %."""
+NORMAL_MEDIAN = 0.6745
+"""Of a standard normal error's absolute value."""
 
 
 class Look(NamedTuple):
@@ -54,10 +53,10 @@ class Look(NamedTuple):
 
 
 class Draw(NamedTuple):
-    """What one method said in one test: (looks,) error and stated standard deviation."""
+    """What one method said in one test with one seed, at all looks."""
 
-    error: np.ndarray
-    std: np.ndarray
+    error: np.ndarray  # (looks,)
+    std: np.ndarray  # (looks,) as stated
 
 
 @cache
@@ -70,6 +69,7 @@ def simulated(name: str, drifting: bool, elastic: bool) -> Truth:
     scenario, model = BUILDERS[name](), {e.name: e for e in load_model(TESTS[name]).elements}
     elements = []
     for element in scenario.system.elements:
+        assert isinstance(element.spring, Spring)
         curve, of_model = element.spring.stiffness, model[element.name]
         spring = replace(
             element.spring,
@@ -93,7 +93,7 @@ def recorded(truth: Truth, noise: float, seed: int) -> Recording:
 
 
 @cache
-def _test_of(scenario: Scenario):
+def _test_of(scenario: Scenario) -> Test:
     return record(replace(scenario.ideal(), duration=2.0 / scenario.rate), 0)[0].test
 
 
@@ -128,9 +128,9 @@ def looks(structure: Structure, truth: Truth) -> list[Look]:
 
 def said(structure: Structure, recording: Recording, method: str, places: list[Look]) -> Draw:
     """The method's values at the looks; it sees the recording up to the last of them."""
-    estimator, last = make_estimator(structure, recording.test, method, compiled=COMPILED), max(look.sample for look in places)
+    estimator, last = make_estimator(structure, recording.test, method), max(look.sample for look in places)
     at, which = [look.sample for look in places], [look.parameter for look in places]
-    if hasattr(estimator, "follow"):
+    if isinstance(estimator, CompiledEstimator):
         _, rows = estimator.follow(estimator.init(), recording.time_ns[: last + 1], recording.values[: last + 1])
         value, std = (rows[:, estimator.columns[field]][at, which] for field in ("parameters", "std"))
     else:
@@ -146,18 +146,21 @@ def said(structure: Structure, recording: Recording, method: str, places: list[L
 
 
 class Row(NamedTuple):
-    """One parameter of one model: (methods,) shares inside, and the same by instant."""
+    """One parameter of one model by one method."""
 
     model: str
     parameter: str
     method: str
-    inside: float
-    by_instant: np.ndarray
-    spread: float  # median |error| over its median sigma, times 1.48: 1 where the sigmas are right
+    inside: float  # share of seeds and instants at which the truth lies within `LIMIT` sigma
+    by_instant: np.ndarray  # (INSTANTS,) the same at each
+    spread: float  # median of |error| / sigma, over that of a normal error: 1 where the sigmas are right
     relative: float  # median sigma over the truth
 
 
-def rows(seeds: range, drifting: bool, methods=METHODS, tests=tuple(TESTS)) -> Iterator[Row]:
+def rows(
+    seeds: range, drifting: bool, methods: Sequence[str] = METHODS, tests: Sequence[str] = tuple(TESTS)
+) -> Iterator[Row]:
+    """One row for each test, method and parameter; the noise goes round `NOISES` seed by seed."""
     for name in tests:
         structure = model_for(name, drifting)
         for method in methods:
@@ -174,7 +177,11 @@ def rows(seeds: range, drifting: bool, methods=METHODS, tests=tuple(TESTS)) -> I
             for j in dict.fromkeys(index.tolist()):
                 of = index == j
                 yield Row(
-                    TESTS[name], structure.parameters[j].name, method, float(inside[:, of].mean()),
-                    inside[:, of].mean(axis=0), float(np.median(np.abs(error / std)[:, of]) * 1.4826),
+                    TESTS[name],
+                    structure.parameters[j].name,
+                    method,
+                    float(inside[:, of].mean()),
+                    inside[:, of].mean(axis=0),
+                    float(np.median(np.abs(error / std)[:, of]) / NORMAL_MEDIAN),
                     float(np.median((std / np.abs(values))[:, of])),
                 )

@@ -155,8 +155,8 @@ class Kinematics:
             )
         noise, offset_variance, sensors = self._noise(state, dt)
         return state, Motion(
-            sample.time, dt, displacement, velocity, acceleration, crush, rate, measured, noise, offset_variance, sensors,
-            now, applied=applied,
+            sample.time, dt, displacement, velocity, acceleration, crush, rate, measured, noise, offset_variance,
+            sensors, now, applied=applied,
         )  # fmt: skip
 
     def _body_accelerations(self, values: np.ndarray) -> np.ndarray:
@@ -216,7 +216,7 @@ class Kinematics:
         )
 
     def _noise(self, state: KinematicState, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(q,) variance of each equation's measurement, (b,) of the error of the zero offset that was removed, sensors."""
+        """(q,) variance of each measurement, (b,) of the error of the zero offset that was removed, and `sensors`."""
         count = state.count.max(initial=0.0)
         if count < FEWEST:
             nothing = np.zeros_like(state.squares)

@@ -1,9 +1,10 @@
 """Gauss-Newton over a record that is at hand: pass after pass, each from the noise model that the one before has found.
 
-One pass of the recursion estimates theta while it does not yet know the noise model: samples count little until it begins
-to (`gauss_newton.TRUST`), and the first ones that count do so with a noise model that is wrong. A pass that begins with the
-noise model is the recursion's next Gauss-Newton step (thesis 4.12). theta begins from its initial value again, and the noise
-model with the covariance of the first pass, whatever the number of passes: the record is the same, and tells no more.
+One pass of the recursion estimates theta while it does not yet know the noise model: samples count little until it
+begins to (`gauss_newton.TRUST`), and the first ones that count do so with a noise model that is wrong. A pass that
+begins with the noise model is the recursion's next Gauss-Newton step (thesis 4.12). theta begins from its initial value
+again, and the noise model with the covariance of the first pass, whatever the number of passes: the record is the same,
+and tells no more.
 """
 
 from collections.abc import Callable
@@ -17,10 +18,12 @@ from .estimate import Estimate
 from .estimators.gauss_newton import GaussNewton, NoiseModel
 
 SETTLED = 0.05
-"""Of its standard deviation: a pass that moves no parameter by more has settled. A twentieth does not show in an error."""
+"""Of its standard deviation: a pass that moves no parameter by more has settled. A twentieth does not show in an
+error."""
 
 MOST_PASSES = 10
-"""On simulated tests with coloured noise three settle; ten that do not say that the orders are too many for the record."""
+"""On simulated tests with coloured noise three settle; ten that do not say that the orders are too many for the
+record."""
 
 
 class Passes(NamedTuple):
@@ -52,9 +55,7 @@ def repeats(estimator: Any) -> bool:
     return isinstance(method, GaussNewton) and not method.start and bool(estimator.description.extra)
 
 
-def settle(
-    make: Callable[[tuple[NoiseModel, ...]], Any], recording: Recording, most: int = MOST_PASSES
-) -> Passes:
+def settle(make: Callable[[tuple[NoiseModel, ...]], Any], recording: Recording, most: int = MOST_PASSES) -> Passes:
     """Passes of `make(start)`, an estimator with method Gauss-Newton, until they settle, `most` of them."""
     estimator = make(())
     models, estimates = _one_pass(estimator, recording)

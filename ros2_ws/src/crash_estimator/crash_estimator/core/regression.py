@@ -3,8 +3,8 @@
     y = measured - known,    Psi = d(prediction) / d(theta)
 
 A parameter that is known, or whose element is apart, has left Psi ("reduce" in figure 6.6); its value
-returns unchanged ("expand"). One whose crush or rate is not known beyond its own error (`KNOWN_FROM`) stays in Psi and is
-held: a method takes it as it is, not as known.
+returns unchanged ("expand"). One whose crush or rate is not known beyond its own error (`KNOWN_FROM`) stays in Psi and
+is held: a method takes it as it is, not as known.
 """
 
 from typing import NamedTuple

@@ -1,4 +1,5 @@
-"""Errors in the regressor: crush and rate are integrated from accelerometers that err, and the regression takes them as true.
+"""Errors in the regressor: crush and rate are integrated from accelerometers that err, and the regression takes them as
+true.
 
 An accelerometer of body k, its zero known from n samples before the impact, is wrong by z_k, its body's velocity and
 displacement by u_k and d_k:
@@ -41,9 +42,9 @@ import numpy as np
 KNOWN_FROM = 3.0
 """Standard deviations of its own error that a crush, or a rate, must have for its coefficient to be estimated from it.
 
-What is integrated before an element is touched is error alone. A coefficient estimated from it goes to zero, and is sure
-of that; from 3 on what is lost by it is less than a tenth. Until then the coefficient is held at its latest value, and what may be
-wrong with that is counted as the error of the others (a parameter that is considered, Schmidt 1966)."""
+What is integrated before an element is touched is error alone. A coefficient estimated from it goes to zero, and is
+sure of that; from 3 on what is lost by it is less than a tenth. Until then the coefficient is held at its latest value,
+and what may be wrong with that is counted as the error of the others (a parameter that is considered, Schmidt 1966)."""
 
 SMALLEST_SHARE = 0.05
 """Of a parameter's scale: a walk is a share of the value, and a stiffness near zero must be able to walk as well."""
@@ -88,7 +89,8 @@ class Consequence(NamedTuple):
         return self._replace(covariance=self.covariance + np.diag(variance))
 
     def after(self, gain: np.ndarray, gradient: np.ndarray, errors: MotionErrors | None) -> "Consequence":
-        """After the step theta += gain (y - gradient theta), of rows that are measured; gain (w, q), gradient (q, w)."""
+        """After the step theta += gain (y - gradient theta), of rows that are measured; gain (w, q), gradient (q,
+        w)."""
         if errors is None:
             h, known = np.zeros((len(gradient), *self.shared.shape[1:])), np.zeros((*self.shared.shape[1:], 3))
             shared, time = self.shared, self.time

@@ -3,8 +3,8 @@
 The errors of the equations are independent (R2 is diagonal), so their updates may be made in turn, each with
 a scalar instead of a matrix to invert:  s = psi P psi' + r,  L = P psi' / s,  P = (I - L psi) P (I - L psi)' + L r L'.
 
-The row of L of a parameter that is held is 0; where it is held at a bound it has left psi as well. With L = K - H, K the
-gain of all and H its held rows, that is
+The row of L of a parameter that is held is 0; where it is held at a bound it has left psi as well. With L = K - H, K
+the gain of all and H its held rows, that is
 
     P = P - s K K' + s H H'
 
@@ -15,11 +15,11 @@ the update of all, which factors take, and a square added for those that are hel
 import numpy as np
 from numba import njit
 
-from ..regressor_errors import SMALLEST_SHARE
 from ..kinematics import FEWEST, RECORD
 from ..regression import QUIETEST
-from .regressor_errors import pass_on
+from ..regressor_errors import SMALLEST_SHARE
 from .factors import add_square, observe, product_of, seen_through, widen
+from .regressor_errors import pass_on
 
 
 @njit(cache=True)

@@ -6,8 +6,8 @@ from numba import njit
 from ..contact import REVERSAL
 from ..estimate import ElementState
 from ..kinematics import FEWEST, RATE_SMOOTHING
-from ..regressor_errors import KNOWN_FROM
 from ..regression import QUIETEST, SHORTEST_CRUSH
+from ..regressor_errors import KNOWN_FROM
 
 LOADING, UNLOADING, APART = (float(state) for state in ElementState)
 

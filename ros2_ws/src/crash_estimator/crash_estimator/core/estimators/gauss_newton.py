@@ -160,8 +160,8 @@ class GaussNewton:
         past = (Past(target, regression.gradient, error, filtered, given, passed), *state.past)[:longest]
         begun = learning & ~state.learning & ~np.array([p + q == 0 for p, q in self.orders(equations)])
         update = update._replace(
-            events=update.events + tuple(self._begins(k, regression.time) for k in np.flatnonzero(begun)),
-            beside=update.beside[:parameters, :parameters],
+            events=update.events + tuple(self._begins(int(k), regression.time) for k in np.flatnonzero(begun)),
+            beside=np.asarray(update.beside)[:parameters, :parameters],
             theta=rls.theta[:parameters],
             covariance=update.covariance[:parameters, :parameters],
             clamped=update.clamped[:parameters],
@@ -188,8 +188,8 @@ class GaussNewton:
     def _begins(equation: int, time: float) -> Event:
         """What one pass is worth: the samples before were weighed as if theirs was not the noise of the model."""
         text = (
-            f"noise model of equation {equation + 1}: learnt from {time * 1e3:.1f} ms on; in this pass the samples before "
-            f"have counted {TRUST:.0%} (`estimate` goes over a record again until it settles)"
+            f"noise model of equation {equation + 1}: learnt from {time * 1e3:.1f} ms on; in this pass the samples "
+            f"before have counted {TRUST:.0%} (`estimate` goes over a record again until it settles)"
         )
         return Event("orders", f"equation {equation + 1}", TRUST, text)
 

@@ -125,10 +125,12 @@ class Kalman:
         return beside
 
     def _at_first(self, regression: Regression, count: int) -> Consequence:
-        """P starts from zeros that are wrong by their own error and by the noise's mean; the latter is followed here."""
+        """P starts from zeros that are wrong by their own error and by the noise's mean; that is followed here."""
         beside = none_yet(count, 0 if regression.errors is None else len(regression.errors.zero))
         if self.offsets and regression.errors is not None:
-            surplus = np.where(regression.offset_variance > 0.0, regression.errors.zero - regression.offset_variance, 0.0)
+            surplus = np.where(
+                regression.offset_variance > 0.0, regression.errors.zero - regression.offset_variance, 0.0
+            )
             p = count - len(surplus)
             return beside.walked(np.concatenate([np.zeros(p), surplus]))
         return beside

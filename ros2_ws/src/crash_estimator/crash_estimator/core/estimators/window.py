@@ -49,6 +49,4 @@ def mean_of(window: Window, now: Regression) -> Regression:
     errors = now.errors
     if errors is not None:
         errors = errors._replace(gradient=np.nan_to_num(window.by_errors / count[:, None, None]))
-    return Regression(
-        nothing, gradient, target, window.active, still, noise, window.duration, now.time, errors=errors
-    )
+    return Regression(nothing, gradient, target, window.active, still, noise, window.duration, now.time, errors=errors)

@@ -1,0 +1,121 @@
+"""Errors of the integrated motion in the covariance: against the joint covariance, and against simulation."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from crash_estimator.benchmarks.coverage import LIMIT, looks, model_for, recorded, rows, simulated
+from crash_estimator.core.methods import make_estimator
+from crash_estimator.core.regressor_errors import Consequence, MotionErrors, none_yet
+from crash_estimator.model_file import load_model
+from crash_replay.recording import Recording
+
+B, P, Q = 2, 3, 2
+VARIANCES = np.array([0.3, 0.1]), np.array([2e-3, 5e-3]), np.array([0.04, 0.0])  # zero, density, velocity
+
+
+def errors_at(time, gradient=None):
+    return MotionErrors(np.zeros((Q, B, 3)) if gradient is None else gradient, *VARIANCES, time)
+
+
+def step_of(dt):
+    """F and the covariance of what the noise adds to (z, u, d) in dt, for a density of 1."""
+    f = np.array([[1.0, 0.0, 0.0], [dt, 1.0, 0.0], [dt * dt / 2.0, dt, 1.0]])
+    return f, np.array([[0.0, 0.0, 0.0], [0.0, dt, dt * dt / 2.0], [0.0, dt * dt / 2.0, dt**3 / 3.0]])
+
+
+def test_the_motion_s_errors_grow_as_integration_makes_them():
+    f, added = step_of(0.02)
+    then, now = errors_at(0.05).covariance(), errors_at(0.07).covariance()
+    for b in range(B):
+        assert_allclose(now[b], f @ then[b] @ f.T + VARIANCES[1][b] * added, rtol=1e-12)
+    start = errors_at(0.0).covariance()
+    assert_array_equal(start[0], np.diag([VARIANCES[0][0], VARIANCES[2][0], 0.0]))
+
+
+def test_what_they_make_of_theta_is_the_joint_covariance_of_both_for_any_gains():
+    """theta's error and the motion's in one vector: [I - G Psi, G H; 0, F], the noise of the sample left out."""
+    rng, n, dt = np.random.default_rng(1), 3 * B, 0.01
+    found = none_yet(P, B)
+    joint = np.zeros((P + n, P + n))
+    for b in range(B):
+        at = slice(P + 3 * b, P + 3 * b + 3)
+        joint[at, at] = errors_at(0.0).covariance()[b]
+    f, added = step_of(dt)
+    for k in range(1, 12):
+        move, walk = np.eye(P + n), np.zeros_like(joint)
+        for b in range(B):
+            at = slice(P + 3 * b, P + 3 * b + 3)
+            move[at, at], walk[at, at] = f, VARIANCES[1][b] * added
+        joint = move @ joint @ move.T + walk
+        gain, gradient = rng.standard_normal((P, Q)) * 0.3, rng.standard_normal((Q, P))
+        h = rng.standard_normal((Q, B, 3))
+        h[:, :, 0] = 0.0  # no equation is a body's own here: the sample's noise is not in the motion
+        whole = np.eye(P + n)
+        whole[:P, :P] -= gain @ gradient
+        whole[:P, P:] = gain @ h.reshape(Q, n)
+        joint = whole @ joint @ whole.T
+        found = found.after(gain, gradient, errors_at(k * dt, h))
+        assert_allclose(found.covariance, joint[:P, :P], rtol=1e-9, atol=1e-12)
+        assert_allclose(found.shared.reshape(P, n), joint[:P, P:], rtol=1e-9, atol=1e-12)
+
+
+def test_the_noise_of_a_sample_is_in_the_velocity_after_it():
+    h = np.zeros((Q, B, 3))
+    h[0, 1, 0] = 1.0
+    gain = np.array([[2.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
+    after = none_yet(P, B).after(gain, np.zeros((Q, P)), errors_at(0.0, h))
+    assert_allclose(after.shared[0, 1], [2.0 * VARIANCES[0][1], 2.0 * VARIANCES[1][1], 0.0], atol=1e-15)
+
+
+def test_without_known_errors_only_the_walk_counts():
+    start = Consequence(np.eye(P), np.zeros((P, 0, 3)), 0.0)
+    gain, gradient = np.full((P, 1), 0.1), np.ones((1, P))
+    lessen = np.eye(P) - gain @ gradient
+    after = start.walked(np.ones(P)).after(gain, gradient, None)
+    assert_allclose(after.covariance, 2.0 * lessen @ lessen.T, rtol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["rls", "mrls", "kalman", "constrained_kalman"])
+def test_the_truth_lies_inside_with_integrated_crush(method):
+    """20 seeds with 5 instants and 2 stiffnesses that go together: some 40 that do not, of which 95 % +- 7 % lie inside."""
+    inside = [row.inside for row in rows(range(20), False, [method], ["frontal_engine_cab"])]
+    assert np.mean(inside) > 0.85
+
+
+@pytest.mark.parametrize("method", ["rls", "constrained_kalman"])
+def test_a_wrong_initial_velocity_is_counted_where_the_model_says_how_wrong(method):
+    """The stated velocity is wrong by 0.3 m/s of standard deviation, which 1 % of the stiffness does not show."""
+    truth, structure = simulated("frontal_single", False, False), model_for("frontal_single", False)
+    place = looks(structure, truth)[2]
+    bodies = (replace(structure.bodies[0], velocity_std=0.3), *structure.bodies[1:])
+    said = {0.0: structure, 0.3: replace(structure, bodies=bodies)}
+    inside = {std: [] for std in said}
+    for seed in range(30):
+        recording = recorded(truth, 1.0, seed)
+        speed = recording.test.initial_velocity["car"] + 0.3 * np.random.default_rng(seed).standard_normal()
+        test = replace(recording.test, initial_velocity={"car": speed})
+        for std, model in said.items():
+            estimator = make_estimator(model, test, method)
+            _, found = estimator.follow(estimator.init(), recording.time_ns, recording.values)
+            value, sigma = (found[place.sample, estimator.columns[f]][place.parameter] for f in ("parameters", "std"))
+            inside[std].append(abs(value - place.truth) < LIMIT * sigma)
+    assert np.mean(inside[0.3]) > 0.8 > 0.6 > np.mean(inside[0.0])
+
+
+@pytest.mark.parametrize("method", ["rls", "kalman", "constrained_kalman", "gauss_newton", "afmm"])
+def test_what_is_integrated_before_contact_tells_nothing_of_a_stiffness(method):
+    """Rib and spine rest until the door comes: their crush is error alone, and their stiffness stays as it was."""
+    structure, truth = load_model("side_dummy"), simulated("side_dummy_unpadded", False, False)
+    recording = recorded(truth, 2.0, 3)
+    before = recording.time_ns < 10_000_000
+    recording = Recording(recording.test, recording.time_ns[before], recording.values[before])
+    estimator = make_estimator(structure, recording.test, method)
+    state = estimator.init()
+    for sample in recording.samples():
+        state, estimate = estimator.step(state, sample)
+    k = estimator.description.parameters.index("rib_spine.stiffness")
+    assert estimate.crush[1] != 0.0
+    assert_allclose(estimate.parameters[k], 5.0e4, rtol=1e-12)  # afmm's is a mean of equal values
