@@ -80,7 +80,7 @@ def test_without_known_errors_only_the_walk_counts():
 
 @pytest.mark.parametrize("method", ["rls", "mrls", "kalman", "constrained_kalman"])
 def test_the_truth_lies_inside_with_integrated_crush(method):
-    """20 seeds with 5 instants and 2 stiffnesses that go together: some 40 that do not, of which 95 % +- 7 % lie inside."""
+    """20 seeds with 5 instants and 2 stiffnesses that go together: some 40 that do not, 95 % +- 7 % inside."""
     inside = [row.inside for row in rows(range(20), False, [method], ["frontal_engine_cab"])]
     assert np.mean(inside) > 0.85
 
