@@ -1,9 +1,10 @@
 """Damping once the stiffness is known (thesis 7.3): fewer unknowns while there is little data.
 
 Any method, with the damping of an element held at its initial value ("reduce" in figure 6.6) until the standard
-deviation of that element's stiffness is below `share` of its value; from then on it is estimated as well. Until
-then the stiffness takes up some of the damping's force. A method that forgets, or whose stiffness drifts, gives it
-back; one with a constant stiffness keeps part of it.
+deviation of that element's stiffness, as far as noise goes, is below `share` of its value; from then on it is estimated
+as well. Errors of the motion and the lag do not count here: they need not fall with time. Until then the stiffness
+takes up some of the damping's force. A method that forgets, or whose stiffness drifts, gives it back; one with a
+constant stiffness keeps part of it.
 """
 
 from dataclasses import dataclass
