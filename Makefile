@@ -38,8 +38,8 @@ test: lint # all tests, style and types first; some of them with PYTEST_ARGS="-k
 bags: # the simulated recordings in bags/, made anew
 	@tools/run crash_replay synthesize --all --to bags
 
-thesis: # the thesis's simulated experiments run again: docs/thesis.md
-	@tools/env python -m crash_estimator.thesis
+thesis: # the thesis's experiments run again: docs/thesis.md; with measured tests in DATA=FOLDER, which do not come with the project
+	@tools/env python -m crash_estimator.thesis $(if $(DATA),--data "$(DATA)")
 
 benchmark: # every promised speed beside its reference, 8 minutes: docs/benchmark.md; ARGS="--quick" writes out/benchmark.md
 	@tools/setup
