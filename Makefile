@@ -1,4 +1,4 @@
-.PHONY: help demo lint check test bags thesis benchmark benchmark-effects benchmark-second benchmark-outside chaos endurance fuzz clean
+.PHONY: help demo lint check test bags thesis benchmark benchmark-effects benchmark-second benchmark-outside chaos endurance fuzz mutants clean
 
 help: # what there is to make
 	@sed -n 's/^\([a-z-]*\):.*# /make \1	/p' Makefile
@@ -63,6 +63,9 @@ endurance: # a million samples through every method, 500 tests and 500 passes th
 
 fuzz: # 20 000 wrong inputs on every way in: docs/fuzz.md; ARGS="--seed 2", or "--replay out/fuzz/FILE" for one that failed
 	@tools/env python -m crash_estimator.fuzz.command $(ARGS)
+
+mutants: # what share of 200 one-line mistakes the tests catch: docs/mutants.md; ARGS="--seed 2", --mutants, --only core/estimators, --minutes
+	@tools/env python tools/mutants.py $(ARGS)
 
 clean: # removes what the set-up installed and built, and what the programs wrote
 	rm -rf .venv .setup out ros2_ws/build ros2_ws/install ros2_ws/log

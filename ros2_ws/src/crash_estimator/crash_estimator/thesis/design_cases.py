@@ -14,6 +14,7 @@ import numpy as np
 
 from crash_replay.synthetic.curves import Curve
 from crash_replay.synthetic.dummy import CAR, DOOR_LOWER, DOOR_UPPER, TIME, side_dummy_unpadded
+from crash_replay.synthetic.forces import Law, Spring
 from crash_replay.synthetic.scenario import Scenario, record
 from crash_replay.synthetic.system import Motion
 
@@ -74,16 +75,14 @@ def car(name: str) -> Scenario:
         for b in base.system.bodies
     )
     elements = tuple(
-        replace(e, spring=replace(e.spring, stiffness=_scaled(e.spring.stiffness, interior)))
-        if e.name in INTERIOR
-        else e
-        for e in base.system.elements
+        replace(e, spring=_scaled(e.spring, interior)) if e.name in INTERIOR else e for e in base.system.elements
     )
     return replace(base, name=f"car_{name}", system=replace(base.system, bodies=bodies, elements=elements))
 
 
-def _scaled(curve: Curve, factor: float) -> Curve:
-    return Curve(curve.x, [factor * y for y in curve.y])
+def _scaled(spring: Law, factor: float) -> Law:
+    assert isinstance(spring, Spring)
+    return replace(spring, stiffness=Curve(spring.stiffness.x, [factor * y for y in spring.stiffness.y]))
 
 
 def cases(seeds: int) -> Cases:

@@ -9,7 +9,7 @@ import numpy as np
 from crash_replay.gravity import G
 from crash_replay.synthetic.curves import Curve
 from crash_replay.synthetic.dummy import side_dummy_unpadded
-from crash_replay.synthetic.forces import Spring
+from crash_replay.synthetic.forces import Law, Spring
 from crash_replay.synthetic.integrate import simulate
 from crash_replay.synthetic.system import Body, Element, Motion, System
 
@@ -58,7 +58,7 @@ def structure(dummy: bool) -> System:
     return System(moving + bodies, tuple(elements) + joined)
 
 
-def _behind(spring: Spring, gap: float):
+def _behind(spring: Law, gap: float) -> Law:
     """The same spring behind a clearance: both doors start where the barrier meets them."""
     return lambda crush, rate, peak: spring(crush - gap, rate, max(peak - gap, 0.0))
 
@@ -93,7 +93,8 @@ def _dummy_alone(time: np.ndarray, velocity: dict[str, np.ndarray]) -> np.ndarra
     """(n, 3) m/s^2 of the dummy of figure 6.4(b) on the doors of 6.4(a)."""
     loaded, knots = side_dummy_unpadded().system, slice(None, None, 5)
     bodies = tuple(
-        replace(b, motion=Motion(time[knots], velocity[b.name][knots])) if b.motion else b for b in loaded.bodies
+        replace(b, motion=Motion(list(time[knots]), list(velocity[b.name][knots]))) if b.motion else b
+        for b in loaded.bodies
     )
     history = simulate(replace(loaded, bodies=bodies), time, 1e-5)
     names = [body.name for body in bodies]

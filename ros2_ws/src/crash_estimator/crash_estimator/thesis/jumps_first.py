@@ -1,7 +1,7 @@
 """4.4.3: first the jumps by AFMM, then Gauss-Newton within the intervals between them."""
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from ..model_file import load_model
 from .experiments import FOLDER, Run, estimate, with_noise
 
 NOISE = 10.0  # m/s^2, the sine's amplitude in 4.5.1
-SLOW = {"p": 1, "q": 2, "memory": 0.02}
+SLOW: dict[str, Any] = {"p": 1, "q": 2, "memory": 0.02}
 """Of Gauss-Newton: within an interval the parameters change slowly."""
 LATE = 0.006
 """s after a change within which AFMM's report counts as of it."""
@@ -75,7 +75,7 @@ def _said(text: str) -> float:
 
 def restarted(structure: Structure, recording: Recording, jumps: list[float]) -> Run:
     """Gauss-Newton that starts anew at each jump, from the values that it has, as unsure of them as at first."""
-    estimator = make_estimator(structure, recording.test, "gauss_newton", **SLOW)
+    estimator: Any = make_estimator(structure, recording.test, "gauss_newton", **SLOW)
     fresh = estimator.method.init(len(estimator.description.equations))
     state, estimates, left = estimator.init(), [], sorted(jumps)
     for sample in recording.samples():

@@ -1,7 +1,7 @@
 """4.5.2 and 5.6.2 in kind on a measured test, NHTSA 10146: a 2018 sedan into a barrier at 57 km/h, sampled at 1 ms."""
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from .experiments import Run, estimate, in_passes
 
 END = 0.1  # s
 ORDERS = ((0, 0), (1, 2), (3, 4))
-GAUSS_NEWTON = {"memory": 0.01, "noise_memory": 0.1}
+GAUSS_NEWTON: dict[str, Any] = {"memory": 0.01, "noise_memory": 0.1}
 TEST_DATA = {  # table 5.1, test data: error variance over that of the input
     "cab": (1.458 / 2.237, 1.583 / 2.237),
     "engine": (3.805 / 6.138, 1.257 / 6.138),
@@ -33,7 +33,7 @@ class Measured(NamedTuple):
     jumps: list[float]  # s, by AFMM on the samples as recorded
     turned: float  # s, where the car's velocity changes its sign
     orders: dict[tuple[int, int], Run]
-    inside: dict[tuple[int, int], tuple[float, float, float]]  # lags in the 99 % limit: auto, with crush, with rate
+    inside: dict[tuple[int, int], tuple[float, ...]]  # lags in the 99 % limit: auto, with crush, with rate
     ratings: dict[tuple[int, int], tuple[float, float]]  # free run: acceleration, velocity
     force: dict[tuple[int, int], tuple[float, float]]  # of the barrier force: rms difference of K X, correlation
     shares: dict[str, np.ndarray]  # rls, mrls -> (3,) error variance over that of the input

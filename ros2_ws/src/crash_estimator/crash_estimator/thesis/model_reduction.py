@@ -72,8 +72,8 @@ def reduction(seeds: int) -> Reduction:
         sigma[name] = np.array([[e.std[0] for e in run.estimates] for run in runs])
         scatter[name], error[name] = k.std(axis=0), k.mean(axis=0) - true
     time = tests[0].time
-    arrays = [{m: np.array(v) for m, v in by.items()} for by in (variance, criterion)]
-    return Reduction(*arrays, sigma, scatter, error, time)
+    variances, criteria = ({m: np.array(v) for m, v in by.items()} for by in (variance, criterion))
+    return Reduction(variances, criteria, sigma, scatter, error, time)
 
 
 def recordings(curve: Curve, seeds: int) -> tuple[np.ndarray, list[Recording]]:

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,7 +29,7 @@ STEP = 0.09
 END = 0.06
 """s: until then the structure folds; the thesis's duration of interest in a side impact (5.5)."""
 MASSES = {"mdb": 1000.0, "door": 80.0, "car": 1500.0}
-SMOOTH = {"memory": 0.01, "noise_memory": 0.1, "known_to": np.inf}
+SMOOTH: dict[str, Any] = {"memory": 0.01, "noise_memory": 0.1, "known_to": np.inf}
 STIFFNESSES = ("mdb_door", "door_car")
 
 

@@ -159,7 +159,8 @@ class Rls:
             updated[index] += step
             return updated
 
-        bounds = self.settings if self.constrained else self.settings._replace(lower=-np.inf, upper=np.inf)
+        none = np.full(len(state.theta), np.inf)
+        bounds = self.settings if self.constrained else self.settings._replace(lower=-none, upper=none)
         theta, clamped = within_bounds(solve, state.theta, excited, bounds)
         lessen = np.eye(len(theta)) - gain @ regression.gradient
         state = state._replace(
