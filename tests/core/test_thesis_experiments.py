@@ -17,10 +17,14 @@ from crash_estimator.thesis import side_impact as distribution
 
 
 def test_masses_and_forces_of_the_side_impact():
-    """4.5.4: masses near the true ones; the orders' forces are nearer to one another than to the truth."""
+    """4.5.4: masses near the true ones; the orders' forces are nearer to one another than to the truth.
+
+    The door's mass scatters by 9 % over the seeds (a thirtieth of the total, noise of a fifth of the signal); three times
+    that over the root of five is 12 %. The others' scatter by 2 %.
+    """
     found = distribution.side_impact(seeds=5)
     true = np.array(list(distribution.MASSES.values()))
-    assert np.abs(np.median(found.masses["ours"], axis=0) / true - 1.0).max() < 0.05
+    assert (np.abs(np.median(found.masses["ours"], axis=0) / true - 1.0) < [0.03, 0.12, 0.03]).all()
     apart = np.median(found.apart, axis=0)
     assert (apart < np.median(found.force[0, 3], axis=0)).all() and apart.max() < 0.08
     assert np.median(found.inside[0, 3]) > np.median(found.inside[0, 0])

@@ -43,8 +43,7 @@ def chapter_5(frontal: Ratios, side: Ratios, others: dict[str, Ratios], figures:
     page = [
         "## 5.6.1 RLS and MRLS", "",
         "Error variance over noise variance, in every equation; the error is that of the output with the updated "
-        "parameters, "
-        "as in tables 5.1 and 5.2.", "",
+        "parameters, as in tables 5.1 and 5.2.", "",
     ]  # fmt: skip
     for title, found, table, settings in (
         ("frontal (table 5.1)", frontal, TABLE_5_1, FRONTAL),
@@ -84,11 +83,9 @@ def chapter_5(frontal: Ratios, side: Ratios, others: dict[str, Ratios], figures:
     ]
     titles = ("other conditions, equations 1 to 3", *(f"{m} {k}" for m in ("RLS", "MRLS") for k in (1, 2, 3)))
     page += [
-        "Masses, dampings, K3, forgetting and m are those of table 5.3, the error limit is its sigma / sqrt(m). "
-        "Its cr of 50 and 20 "
-        "is not: on these curves so large a correction overshoots (the last rows), so cr is 3. The sharper the change, "
-        "the more its "
-        "first sample weighs, which no recursion can know of:", "",
+        "Masses, dampings, K3, forgetting and m are those of table 5.3, the error limit is its sigma / sqrt(m). Its "
+        "cr of 50 and 20 is not: on these curves so large a correction overshoots (the last rows), so cr is 3. The "
+        "sharper the change, the more its first sample weighs, which no recursion can know of:", "",
         markdown_table(titles, more), "",
     ]  # fmt: skip
     panels = _parameters(frontal, cases.frontal(), "frontal", "figure 5.4") + _parameters(
@@ -167,8 +164,7 @@ def _means(frontal: Ratios, side: Ratios) -> list[str]:
             rows.append((f"{title}: {name}", *theirs, *ours))
     return [
         "Mean of the error, in standard deviations of the noise (the thesis's of one repetition, whose noise has a "
-        "mean of "
-        "its own; ours medians):", "",
+        "mean of its own; ours medians):", "",
         markdown_table(("case: equation", "thesis noise", "thesis RLS", "thesis MRLS", "RLS", "MRLS"), rows), "",
     ]  # fmt: skip
 
@@ -177,8 +173,8 @@ def _table_5_4(frontal: Ratios, side: Ratios) -> list[str]:
     """Cross-correlation of the error with the inputs at lag 0: the thesis's / ours."""
     page = [
         "Cross-correlation of the error with the inputs at lag 0 (table 5.4), in each cell the thesis's and the "
-        "median of "
-        "ours. Signs of ours: crush and rate positive in compression, the barrier's force as it is pushed.", "",
+        "median of ours. Signs of ours: crush and rate positive in compression, the barrier's force as it is pushed.",
+        "",
     ]  # fmt: skip
     for case, found in (("frontal", frontal), ("side", side)):
         inputs = INPUTS[case]

@@ -56,35 +56,27 @@ def chapter_4(found: list[NoiseOrders], of_the_model: list[NoiseOrders], figures
     draw(figures / "chapter_4.png", panels, columns=4)
     return [
         "## 4.5.1 Noise models: p,q = 0,0 and 1,2", "",
-        f"One mass, C/M = 1, 13.3 m/s, 80 samples; noise 10 sin(0.3 t) and random of variance 10. Recursive "
-        f"Gauss-Newton with a memory of {GAUSS_NEWTON['memory'] * 1e3:g} ms, "
-        f"{GAUSS_NEWTON['noise_memory'] * 1e3:g} ms for the noise model; with 1,2 it goes over the record {PASSES} "
-        "times, "
-        "each from the noise model that the one before ended with (5.3: \"an iterative estimation method is "
-        "required\"). "
-        f"Q is Ljung and Box's over {found[0].lags} lags, a quarter of the samples, less p + q degrees of freedom; "
-        "below "
-        f"{limits[0]} (0,0) and {limits[1]} (1,2) the innovation passes for uncorrelated at 95 %. (\"White\", on the "
-        "other pages, "
-        "is what passes the diagnosis's band test, which needs to know the sensor's noise.)", "",
+        "One mass, C/M = 1, 13.3 m/s, 80 samples; noise 10 sin(0.3 t) and random of variance 10. Recursive "
+        f"Gauss-Newton with a memory of {GAUSS_NEWTON['memory'] * 1e3:g} ms, {GAUSS_NEWTON['noise_memory'] * 1e3:g} "
+        f"ms for the noise model; with 1,2 it goes over the record {PASSES} times, each from the noise model that "
+        "the one before ended with (5.3: \"an iterative estimation method is required\"). Q is Ljung and Box's over "
+        f"{found[0].lags} lags, a quarter of the samples, less p + q degrees of freedom; below {limits[0]} (0,0) and "
+        f"{limits[1]} (1,2) the innovation passes for uncorrelated at 95 %. (\"White\", on the other pages, is what "
+        "passes the diagnosis's band test, which needs to know the sensor's noise.)", "",
         markdown_table(head, rows), "",
         "*Apart*: median over time of |difference of the two K/M| over its sigma; *within*: share of the time (from "
         f"{SETTLED * 1e3:g} ms on) within two; of two normal variables of that sigma they would be 0.67 and 95 %. "
         "*Error of K/M*: rms, 1/s^2, of about 600.", "",
         "As in the thesis, the residual of 0,0 is auto-correlated and both orders find the same K/M within their "
-        "sigmas, "
-        "because the residual does not go along with the inputs.", "",
+        "sigmas, because the residual does not go along with the inputs.", "",
         "Which noise: in 4.5.1 the thesis adds a sine and white noise to the simulated acceleration, by its words, "
-        "and says that the residual of 0,0 is autocorrelated; that the residual of 1,2 is not it does not say. "
-        "By 4.1 and 4.12 the equation error is an ARMA(p,q) process, so the last rows have the same experiment with "
-        "noise "
-        "that is one. There 1,2 leaves it uncorrelated. A sine plus white noise is no ARMA(1,2): it is ARMA(2,2) "
-        "with all "
-        "roots on the unit circle, which takes longer than 80 samples to be told. ARMA(1,2) fitted by least squares to "
-        "that noise alone, without any car, passes in 8 % of 40 repetitions of 81 samples, and the recursion with "
-        "2,2 in "
-        "about half. So with the thesis's noise 1,2 takes most of the autocorrelation away (Q, *lags in limit*), "
-        "not all of it.", "",
+        "and says that the residual of 0,0 is autocorrelated; that the residual of 1,2 is not it does not say. By "
+        "4.1 and 4.12 the equation error is an ARMA(p,q) process, so the last rows have the same experiment with "
+        "noise that is one. There 1,2 leaves it uncorrelated. A sine plus white noise is no ARMA(1,2): it is "
+        "ARMA(2,2) with all roots on the unit circle, which takes longer than 80 samples to be told. ARMA(1,2) "
+        "fitted by least squares to that noise alone, without any car, passes in 8 % of 40 repetitions of 81 "
+        "samples, and the recursion with 2,2 in about half. So with the thesis's noise 1,2 takes most of the "
+        "autocorrelation away (Q, *lags in limit*), not all of it.", "",
         *_accelerations(found), "![noise models](thesis/chapter_4.png)", "",
     ]  # fmt: skip
 
@@ -99,13 +91,12 @@ def _accelerations(found: list[NoiseOrders]) -> list[str]:
         for p, q in one.q
     ]  # fmt: skip
     return [
-        "Estimated acceleration, - K X - C V, against the assumed one without noise (figures 4.5, 4.7), rms in m/s^2 "
-        "of a peak "
-        "of about 250; and the lags of the residual's cross-correlation with the inputs that are within the 99 % "
-        "limit:", "",
+        "Estimated acceleration, - K X - C V, against the assumed one without noise (figures 4.5, 4.7), rms in "
+        "m/s^2 of a peak of about 250; and the lags of the residual's cross-correlation with the inputs that are "
+        "within the 99 % limit:", "",
         markdown_table(("K/M, p,q", "rms", "with crush", "with rate"), rows), "",
-        "The thesis shows curves only and says that the residual of either order \"does not cross correlate with the "
-        "input\".", "",
+        "The thesis shows curves only and says that the residual of either order \"does not cross correlate with "
+        "the input\".", "",
     ]  # fmt: skip
 
 
@@ -162,8 +153,8 @@ def chapter_6(found: Covariances, with_offsets: Covariances, figures: Path) -> l
         "Error covariance over noise variance (table 6.1): five stiffnesses, three equations, 10 kHz, 3 g of noise.",
         "",
         markdown_table(("", *(f"thesis {n}" for n in names), *names), rows), "",
-        f"Largest off-diagonal element of a repetition over its mean diagonal: median {np.median(away):.2f}. "
-        "With the zero offsets' errors estimated too (`offsets`, our default) the diagonal is "
+        f"Largest off-diagonal element of a repetition over its mean diagonal: median {np.median(away):.2f}. With "
+        "the zero offsets' errors estimated too (`offsets`, our default) the diagonal is "
         + ", ".join(f"{x:.2f}" for x in np.diag(np.median(with_offsets.ratio, axis=0)))
         + ": a wrong zero, integrated twice, need not be explained by a stiffness.", "",
         "![dummy](thesis/chapter_6.png)", "",

@@ -1,4 +1,4 @@
-"""6.4.1: the dummy hardly changes the door's motion, so that figure 6.3 falls into 6.4(a) and 6.4(b)."""
+"""6.4.1: whether the dummy changes the door's motion so little that figure 6.3 falls into 6.4(a) and 6.4(b)."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -23,11 +23,10 @@ DUMMY = {"rib": 16.8, "pelvis": 39.2, "spine": 28.0}
 
 VERDICT = (
     "So in this car the thesis's assumption that the dummy does not affect the door's velocity is a rough one: half "
-    "a door "
-    "of 40 kg is no heavier than the pelvis that it meets. Its parameters are not affected, because 6.4(b) is "
-    "estimated on "
-    "the doors' measured motion, dummy included; what is predicted from a structure simulated without a dummy (6.4.1, "
-    "last lines) is. The energies do not tell: they count the car, which the dummy's 84 kg hardly slow."
+    "a door of 40 kg is no heavier than the pelvis that it meets. Its parameters are not affected, because 6.4(b) "
+    "is estimated on the doors' measured motion, dummy included; what is predicted from a structure simulated "
+    "without a dummy (6.4.1, last lines) is. The energies do not tell: they count the car, which the dummy's 84 kg "
+    "hardly slow."
 )
 
 
@@ -126,16 +125,16 @@ def section(found: Separation, figures: Path) -> list[str]:
     ]  # fmt: skip
     draw(figures / "door_and_dummy.png", panels)
     return [
-        "## 6.4.1 The door hardly feels the dummy: figure 6.3 against 6.4", "",
-        f"Barrier of 1362 kg at {SPEED:.1f} m/s across the car (53.6 km/h at 27 degrees), both halves of the door, car "
-        "of 1700 kg, with the dummy of 84 kg in one simulation (figure 6.3) and without it in another (6.4a). No "
-        "noise.", "",
+        "## 6.4.1 What the door feels of the dummy: figure 6.3 against 6.4", "",
+        f"Barrier of 1362 kg at {SPEED:.1f} m/s across the car (53.6 km/h at 27 degrees), both halves of the door, "
+        "car of 1700 kg, with the dummy of 84 kg in one simulation (figure 6.3) and without it in another (6.4a). "
+        "No noise.", "",
         markdown_table(("energy after 60 ms, of the barrier's across the car", "thesis", "ours"), energy), "",
-        "The thesis assumes its final speed from experience and counts the longitudinal energy too; the share of the "
-        "cars is what its other two leave.", "",
-        f"The dummy changes the velocity of the door by at most {largest[0]:.2f} m/s (upper) and {largest[1]:.2f} m/s "
-        f"(lower), {largest[0] / peak[0]:.0%} and {largest[1] / peak[1]:.0%} of its largest. Peaks of the dummy, g, in "
-        "the whole model, and alone on the doors that moved without it (6.4b):", "",
+        "The thesis assumes its final speed from experience and counts the longitudinal energy too; the share of "
+        "the cars is what its other two leave.", "",
+        f"The dummy changes the velocity of the door by at most {largest[0]:.2f} m/s (upper) and {largest[1]:.2f} "
+        f"m/s (lower), {largest[0] / peak[0]:.0%} and {largest[1] / peak[1]:.0%} of its largest. Peaks of the dummy, "
+        "g, in the whole model, and alone on the doors that moved without it (6.4b):", "",
         markdown_table(("", "figure 6.3", "6.4(b) on the doors of 6.4(a)", "difference"), rows), "",
         VERDICT, "",
         "![door and dummy](thesis/door_and_dummy.png)", "",

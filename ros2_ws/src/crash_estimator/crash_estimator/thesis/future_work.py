@@ -207,34 +207,30 @@ def section(found: FutureWork) -> list[str]:
         "**3, sampling where parameters change rapidly.** The frontal test of 5.6.1 with 3 g of noise, 10 kN on the "
         "barrier and a vibration of 300 Hz, default settings:", "",
         markdown_table(("test", *METHODS), sampled), "",
-        "Unlike the slowly changing parameter of 4.5.3, these want the faster sampling: a change takes a millisecond "
-        "or two, "
-        "and at 1 ms a method has one sample of it.", "",
+        "Unlike the slowly changing parameter of 4.5.3, these want the faster sampling: a change takes a "
+        "millisecond or two, and at 1 ms a method has one sample of it.", "",
         "**4, filtered data.** The same at 0.1 ms, K changes within 20 mm, all channels filtered forwards and "
         "backwards:",
         "",
         markdown_table(("filter", *METHODS), filtered), "",
-        "To filter helps the Kalman filter, which takes the vibration for noise that it must follow less. It makes "
-        "noise "
-        "that is no longer independent from sample to sample: RLS and MRLS, whose memory is short, get worse.", "",
-        "**5, unloading estimated.** The dummy of 6.4 without padding, both contacts' slopes unknown, from half their "
-        f"value of {UNLOADING * 1e-3:g} kN/m: {slopes[0]:.0f} and {slopes[1]:.0f} kN/m in the median, from {low:.0f} "
-        "to "
-        f"{high:.0f}.", "",
+        "To filter helps the Kalman filter, for which less vibration is less noise. It leaves noise that is no "
+        "longer independent from sample to sample: RLS, whose memory is short, gets worse by half; MRLS is about as "
+        "good as before.", "",
+        "**5, unloading estimated.** The dummy of 6.4 without padding, both contacts' slopes unknown, from half "
+        f"their value of {UNLOADING * 1e-3:g} kN/m: {slopes[0]:.0f} and {slopes[1]:.0f} kN/m in the median, from "
+        f"{low:.0f} to {high:.0f}.", "",
         f"**6, damping later.** One mass, K/M 600 and C/M {TRUE_C:g}, Kalman filter without drift:", "",
         markdown_table(
             ("C is estimated", "rms error of K/M, 5 to 20 ms", "error of K/M at the end", "error of C/M at the end"),
             dampings,
         ), "",
-        "At the beginning there is much rate and little crush: left out, the damper passes for stiffness, and what was "
-        "learnt so is in the filter for good. Later pays where C is not told at first, not here.", "",
+        "At the beginning there is much rate and little crush: left out, the damper passes for stiffness, and what "
+        "was learnt so is in the filter for good. Later pays where C is not told at first, not here.", "",
         "**7, measurement noise that varies with time.** One mass of 4.5.1 at 10 kHz; noise of 1 g, and after the "
-        "impact "
-        f"{SUDDEN[1] / 9.81:.0f} g more that decay within {SUDDEN[2] * 1e3:g} ms. R2 of the Kalman filter constant "
-        "as in the "
-        f"thesis, learnt on the way (our default), and over time from the residuals of {TESTS} other tests:", "",
+        f"impact {SUDDEN[1] / 9.81:.0f} g more that decay within {SUDDEN[2] * 1e3:g} ms. R2 of the Kalman filter "
+        f"constant as in the thesis, learnt on the way (our default), and over time from the residuals of {TESTS} "
+        "other tests:", "",
         markdown_table(("R2", "force error", "K/M within 1.96 sigma of the truth, share of the time"), varying), "",
         "A variance over time from like tests pays most, in force and sigma. To learn it in the one test is less "
-        "good and "
-        "its sigma too small: what K does not follow at once is taken for noise late.", "",
+        "good and its sigma too small: what K does not follow at once is taken for noise late.", "",
     ]  # fmt: skip

@@ -115,14 +115,12 @@ def section(found: JumpsFirst, figures: Path) -> list[str]:
     )  # fmt: skip
     return [
         "## 4.4.3 AFMM's jumps first, Gauss-Newton between them", "",
-        "One mass of 4.5.1 whose K/M jumps from 500 to 900 at 0.25 m, and that unloads steeply from its largest crush; "
-        f"10 kHz, white noise of {NOISE:g} m/s^2. AFMM (preset thesis) reports jumps over the whole record; "
-        "Gauss-Newton "
-        f"(p,q = 1,2, memory {SLOW['memory'] * 1e3:g} ms) then starts anew at each.", "",
+        "One mass of 4.5.1 whose K/M jumps from 500 to 900 at 0.25 m, and that unloads steeply from its largest "
+        f"crush; 10 kHz, white noise of {NOISE:g} m/s^2. AFMM (preset thesis) reports jumps over the whole record; "
+        f"Gauss-Newton (p,q = 1,2, memory {SLOW['memory'] * 1e3:g} ms) then starts anew at each.", "",
         markdown_table(("what happens", "at, ms", f"reported within {LATE * 1e3:g} ms", "off, ms"), rows), "",
         f"Other jumps reported: {others:.1f} a record. The thesis finds the one discontinuity in a measured test "
-        "where the "
-        "velocity is zero and the car starts to rebound (t/t0 = 80, figure 4.13).", "",
+        "where the velocity is zero and the car starts to rebound (t/t0 = 80, figure 4.13).", "",
         markdown_table(("way", "rms error of the force, of its peak"), ways), "",
         "![jumps](thesis/jumps_first.png)", "",
     ]  # fmt: skip

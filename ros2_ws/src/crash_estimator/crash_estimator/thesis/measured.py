@@ -108,17 +108,14 @@ def section(found: Measured | None, figures: Path) -> list[str]:
     return [
         title, "",
         "The thesis's measured tests are normalised and only drawn. Here its figures in kind on a 2018 sedan into a "
-        "barrier "
-        "at 57 km/h: means over 1 ms, 0 to 100 ms, one mass unless it says otherwise.", "",
+        "barrier at 57 km/h: means over 1 ms, 0 to 100 ms, one mass unless it says otherwise.", "",
         f"*Mass* (figures 4.11, 4.12), cab and engine by 4.3a: {said}; on the scales the car had 1719 kg.", "",
         f"*Discontinuities* (figure 4.13): the velocity changes its sign at {found.turned * 1e3:.1f} ms; AFMM on the "
-        "samples "
-        f"as recorded reports a jump at {rebound * 1e3:.0f} ms, and others at "
+        f"samples as recorded reports a jump at {rebound * 1e3:.0f} ms, and others at "
         + ", ".join(f"{t * 1e3:.0f}" for t in found.jumps if t != rebound) + " ms. The thesis: at t/t0 = 80, where the "
         "velocity is zero, and no other major one.", "",
         "*K and C by Gauss-Newton* (figures 4.14 to 4.20), lags of the residual's correlations within the 99 % "
-        "limit, rating of "
-        "the free run (ISO/TS 18571), and K times crush against the measured barrier force:", "",
+        "limit, rating of the free run (ISO/TS 18571), and K times crush against the measured barrier force:", "",
         markdown_table(
             ("p,q", "auto", "with crush", "with rate", "free run: acceleration", "velocity",
              "K X less barrier force, rms of peak", "correlation"), rows), "",

@@ -125,21 +125,16 @@ def section(found: Reduction, figures: Path) -> list[str]:
     return [
         "## 3.7 Model reduction, constancy of the covariance", "",
         f"One mass of 4.5.1, constant K/M 600 and C/M {TRUE_C:g}, white noise of {NOISE:g} m/s^2, 80 samples; the "
-        "models "
-        "are fitted with forgetting 1. Error variance over noise variance; Schwarz's criterion above the least, and "
-        "how "
-        "often a model has the least:", "",
+        "models are fitted with forgetting 1. Error variance over noise variance; Schwarz's criterion above the "
+        "least, and how often a model has the least:", "",
         markdown_table(("model", "error / noise", "criterion", "chosen"), models), "",
         "K alone leaves more than the noise, a cubic term explains no more: K and C are kept. The thesis names the "
-        "test "
-        "and shows no example.", "",
+        "test and shows no example.", "",
         "\"Are the covariances constant with change in time?\" RLS with a memory of 20 ms, sigma of K/M in 1/s^2 at "
-        "three "
-        "instants, for a constant K/M and one that doubles over the crush:", "",
+        "three instants, for a constant K/M and one that doubles over the crush:", "",
         markdown_table(("K/M", *(f"{t * 1e3:g} ms" for t in INSTANTS)), rows), "",
-        "It does not stay constant even for a constant parameter: it falls as the crush, which K is told by, grows. So "
-        "constancy alone does not tell a time-varying parameter; the mean error does, which the truth is needed for. "
-        "What "
-        "serves in its place is whether independent tests' estimates scatter as stated.", "",
+        "It does not stay constant even for a constant parameter: it falls as the crush, which K is told by, grows. "
+        "So constancy alone does not tell a time-varying parameter; the mean error does, which the truth is needed "
+        "for. What serves in its place is whether independent tests' estimates scatter as stated.", "",
         "![reduction](thesis/model_reduction.png)", "",
     ]  # fmt: skip

@@ -95,13 +95,14 @@ def section(found: Padding, figures: Path) -> list[str]:
     upper, lower = ([found.peak(t, e) * 1e-3 for t in ("#1", "#3")] for e in ("door_rib", "door_pelvis"))
     return [
         "## 6.4.4, 6.5 Padded and unpadded: characteristics, free runs, forces by load path", "",
-        "Two simulated tests with 50 mm of padding (#1, #2) and two without (#3, #4), 1 g of noise and zero offsets, "
-        "constrained Kalman filter. Peak forces in kN, in brackets the true ones; *begins*: the force passes 1 kN; "
-        "*alike*: rms difference of the two curves of like tests, share of the peak; *apart*: of #1 and #3.", "",
+        "Two simulated tests with 50 mm of padding (#1, #2) and two without (#3, #4), 1 g of noise and zero "
+        "offsets, constrained Kalman filter. Peak forces in kN, in brackets the true ones; *begins*: the force "
+        "passes 1 kN; *alike*: rms difference of the two curves of like tests, share of the peak; *apart*: of #1 "
+        "and #3.", "",
         markdown_table(
             ("element", "peak #1", "peak #3", "begins #1, ms", "#3, ms", "alike #1 #2, #3 #4", "apart"), rows
         ), "",
-        f"The thesis's statements: \"all five force deflection characteristics correlate well for similar cars\" "
+        "The thesis's statements: \"all five force deflection characteristics correlate well for similar cars\" "
         f"(alike); with padding \"the force starts increasing earlier\" ({found.began['#1']['door_rib'] * 1e3:.1f} "
         f"against {found.began['#3']['door_rib'] * 1e3:.1f} ms at the rib, "
         f"{found.began['#1']['door_pelvis'] * 1e3:.1f} against {found.began['#3']['door_pelvis'] * 1e3:.1f} at the "
@@ -114,8 +115,8 @@ def section(found: Padding, figures: Path) -> list[str]:
         "Correlation of the errors, rib and pelvis, rib and spine, pelvis and spine (from table 6.2, in normalised "
         "units):", "",
         markdown_table(("test", "thesis", "ours"), [(t, _thesis(t), _ours(found.residual[t])) for t in TESTS]), "",
-        "Simulated sensors' noise is independent, so ours are near 0; what a model along one axis leaves of a turning "
-        "dummy is not.", "",
+        "Simulated sensors' noise is independent, so ours are near 0; what a model along one axis leaves of a "
+        "turning dummy is not.", "",
         "![padding](thesis/padding.png)", "",
     ]  # fmt: skip
 

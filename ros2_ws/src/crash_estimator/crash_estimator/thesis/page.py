@@ -123,13 +123,12 @@ def rates(found: Sampling, figures: Path) -> list[str]:
     )
     return [
         "## 4.5.3 Sampling", "",
-        "The same test with a vibration of 300 Hz and 3 g of noise, sampled every 0.1 ms, and as means over 1 ms "
-        "(5 repetitions). "
-        "Orders p,q of the noise model by Schwarz's criterion, force over crush against the truth.", "",
+        "The same test with a vibration of 300 Hz and 3 g of noise, sampled every 0.1 ms, and as means over 1 ms (5 "
+        "repetitions). Orders p,q of the noise model by Schwarz's criterion, force over crush against the truth.", "",
         markdown_table(("sampling", "rms difference from the true force, of its peak", "p,q chosen"), rows), "",
         f"Between the two curves: {np.median(found.between):.1%}. For a slowly changing parameter 1 ms is enough, as "
-        "the thesis concludes. At 0.1 ms every repetition asks for a noise model with a moving-average part; with the "
-        "80 samples at 1 ms the criterion has little to go by.", "",
+        "the thesis concludes. At 0.1 ms every repetition asks for a noise model with a moving-average part; with "
+        "the 80 samples at 1 ms the criterion has little to go by.", "",
         "![sampling](thesis/sampling.png)", "",
     ]  # fmt: skip
 
@@ -154,9 +153,9 @@ def twins(found: Alike) -> list[str]:
     head = ("second test is of", "chi square", "said to differ", "spectra apart, dB", "most at, Hz")
     return [
         "## 7.3 Two alike tests by their noise models", "",
-        f"AR(2) noise models of two tests, 10 kHz, 5 pairs; above {limit:.1f} the coefficients differ at 95 %. "
-        "The ringing is that of the noise model's roots in continuous time (3.5.2, indirect); 1090 and 1513 Hz were "
-        "put in.", "",
+        f"AR(2) noise models of two tests, 10 kHz, 5 pairs; above {limit:.1f} the coefficients differ at 95 %. The "
+        "ringing is that of the noise model's roots in continuous time (3.5.2, indirect); 1090 and 1513 Hz were put "
+        "in.", "",
         markdown_table(head, rows), "",
     ]  # fmt: skip
 
