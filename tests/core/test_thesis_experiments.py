@@ -19,8 +19,8 @@ from crash_estimator.thesis import side_impact as distribution
 def test_masses_and_forces_of_the_side_impact():
     """4.5.4: masses near the true ones; the orders' forces are nearer to one another than to the truth.
 
-    The door's mass scatters by 9 % over the seeds (a thirtieth of the total, noise of a fifth of the signal); three times
-    that over the root of five is 12 %. The others' scatter by 2 %.
+    The door's mass, a thirtieth of the total, scatters by 9 % over the seeds; three times that over the root of five is
+    12 %. The others' scatter by 2 %.
     """
     found = distribution.side_impact(seeds=5)
     true = np.array(list(distribution.MASSES.values()))
