@@ -1,10 +1,9 @@
 """What share of one-line mistakes the tests catch: docs/mutants.md.
 
-    tools/env python tools/mutants.py [--mutants 200] [--seed 1] [--only PART] [--minutes 60]
-
 A mutant is a copy of the packages, in out/mutants, with one operator, condition or number changed. The tests that are
-named like its module, import it or stand beside it judge it; the first that fails has caught it, and so has one that
-takes much longer than on the code as it is. In core/compiled the readable form judges: numba is off
+named like its module, import it or stand beside it judge it, file by file; the first that fails has caught it. What is
+not caught within a time counts as not caught. At the end each test that has caught one must pass on the code as it is;
+where it does not, what it has caught counts as not judged. In core/compiled the readable form judges: numba is off
 (NUMBA_DISABLE_JIT), the recursion runs as Python beside its readable twin, and nothing is compiled anew.
 """
 
@@ -35,7 +34,7 @@ BESIDE = {  # folder -> tests of what it computes that neither bear the name of 
     "readers": "replay/test_import_isomme replay/test_import_nhtsa replay/test_import_lab replay/test_import_command",
     "nodes": "nodes/test_in_order nodes/test_named_estimates nodes/test_estimator_node nodes/test_diagnosis_node",
 }
-LONGEST, PATIENCE = 60.0, (30.0, 3.0)  # s that the judges take together; s, and times that, until one takes too long
+MOST_JUDGES, PATIENCE = 4, 120.0  # files of tests, and s for all of them, to catch one
 SIGNS = {ast.Add: "+ -", ast.Sub: "- +", ast.Mult: "* /", ast.Div: "/ *", ast.Pow: "** *", ast.And: "and or",
          ast.Or: "or and", ast.Eq: "== !=", ast.NotEq: "!= ==", ast.Lt: "< >=", ast.LtE: "<= >", ast.Gt: "> <=",
          ast.GtE: ">= <"}  # fmt: skip
@@ -56,15 +55,12 @@ class Mutant(NamedTuple):
 
 def mutants_of(part: str, path: Path) -> list[Mutant]:
     """Every one-line change of a file."""
-    tree, lines, found, silent = ast.parse(path.read_text()), path.read_text().splitlines(), [], set()
-    for node in ast.walk(tree):
-        text = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-        if text or isinstance(node, ast.JoinedStr | ast.Raise):
-            silent |= set(range(node.lineno, node.end_lineno + 1))
-    for node in ast.walk(tree):
+    nodes, lines, found = list(ast.walk(ast.parse(path.read_text()))), path.read_text().splitlines(), []
+    told = {n for node in nodes if isinstance(node, ast.Raise) for n in range(node.lineno, node.end_lineno + 1)}
+    for node in nodes:
         for line, start, stop, new, kind in _changes(node, lines):
             before = lines[line - 1]
-            if line not in silent and before.isascii() and not SILENT.search(before):  # columns count bytes
+            if line not in told and before.isascii() and not SILENT.search(before):  # columns count bytes
                 after = before[:start] + new + before[stop:]
                 found.append(Mutant(part, path.relative_to(SOURCES), line, kind, before, after))
     return found
@@ -72,29 +68,26 @@ def mutants_of(part: str, path: Path) -> list[Mutant]:
 
 def _changes(node: ast.AST, lines: list[str]) -> list[tuple[int, int, int, str, str]]:
     """(line, first column, last, what stands there instead, of what kind) of one node."""
-    if isinstance(node, ast.Constant):
-        value, place = node.value, (node.lineno, node.col_offset, node.end_col_offset)
-        if isinstance(value, bool):
-            return [(*place, str(not value), "condition")]
-        if isinstance(value, int | float) and abs(value) > 1e-9:
-            return [(*place, repr(value + 1) if isinstance(value, int) else repr(1.25 * value), "number")]
-        return []
-    if isinstance(node, ast.BinOp):
-        op, left, right = node.op, node.left, node.right
-    elif isinstance(node, ast.Compare):
-        op, left, right = node.ops[0], node.left, node.comparators[0]
-    elif isinstance(node, ast.BoolOp):
-        op, left, right = node.op, node.values[0], node.values[1]
-    else:
-        return []
+    match node:
+        case ast.Constant(value=bool(value)):
+            return [(node.lineno, node.col_offset, node.end_col_offset, str(not value), "condition")]
+        case ast.Constant(value=int(value) | float(value)) if abs(value) > 1e-9:
+            new = repr(value + 1) if isinstance(value, int) else repr(1.25 * value)
+            return [(node.lineno, node.col_offset, node.end_col_offset, new, "number")]
+        case ast.BinOp(op=op, left=left, right=right):
+            kind = "operator"
+        case (
+            ast.Compare(ops=[op, *_], left=left, comparators=[right, *_]) | ast.BoolOp(op=op, values=[left, right, *_])
+        ):
+            kind = "condition"
+        case _:
+            return []
     if type(op) not in SIGNS or left.end_lineno != right.lineno:
         return []
     old, new = SIGNS[type(op)].split()
-    whole = isinstance(right, ast.Constant) and isinstance(right.value, int)
-    new = BOUNDARY.get(old, new) if whole else new
+    new = BOUNDARY.get(old, new) if isinstance(right, ast.Constant) and isinstance(right.value, int) else new
     at = lines[right.lineno - 1][left.end_col_offset : right.col_offset].find(old)
     start = left.end_col_offset + at
-    kind = "operator" if isinstance(node, ast.BinOp) else "condition"
     return [(right.lineno, start, start + len(old), new, kind)] if at >= 0 else []
 
 
@@ -122,66 +115,60 @@ def judges(mutant: Mutant) -> list[str]:
     named = [t for t in tests if t.parent.name == near and words & set(t.stem.split("_"))]
     folder = max((folder for folder in BESIDE if inner.startswith(folder)), key=len)
     beside = [ROOT / "tests" / f"{name}.py" for name in BESIDE[folder].split()]
-    return list(dict.fromkeys(str(t.relative_to(ROOT)) for t in [*named, *importing, *beside]))
+    return list(dict.fromkeys(str(t.relative_to(ROOT)) for t in [*named, *importing, *beside]))[:MOST_JUDGES]
 
 
-def judged(tests: list[str], mutant: Mutant, patience: float | None) -> tuple[bool, str, float]:
-    """Run the tests on the copy as it stands -> whether one failed, which, and the seconds that it took."""
+def failed(tests: list[str], compiled: bool, patience: float) -> list[str]:
+    """Run tests on the copy as it stands -> those that failed, at most one of a file; the file where it went wrong."""
     path = os.pathsep.join([*(str(TREE / package) for package in PACKAGES), os.environ.get("PYTHONPATH", "")])
     fixed = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
              "OMP_NUM_THREADS": "1", "NUMBA_CACHE_DIR": str(TREE / "numba")}  # fmt: skip
-    off = {"NUMBA_DISABLE_JIT": "1"} if "compiled" in mutant.path.parts else {}
-    command = [sys.executable, "-m", "pytest", "-p", "_hypothesis_pytestplugin", "-p", "no:cacheprovider", "-x", "-q",
-               "--tb=no", *tests]  # fmt: skip
-    start = time.monotonic()
+    off = {"NUMBA_DISABLE_JIT": "1"} if compiled else {}
+    plain = ["-p", "_hypothesis_pytestplugin", "-p", "no:cacheprovider", "-q", "--tb=no", *["-x"][len(tests) > 1 :]]
+    command, environment = [sys.executable, "-m", "pytest", *plain, *tests], os.environ | fixed | off
     try:
-        done = subprocess.run(
-            command, cwd=ROOT, env=os.environ | fixed | off, capture_output=True, text=True, timeout=patience
-        )
+        done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=patience)
     except subprocess.TimeoutExpired:
-        return True, "took too long", time.monotonic() - start
-    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
-    return done.returncode != 0, failed[1] if failed else f"exit {done.returncode}", time.monotonic() - start
+        return []
+    found = re.findall(r"^(?:FAILED|ERROR) (\S+?)(?: - .*)?$", done.stdout, re.MULTILINE)
+    return found or (tests if done.returncode else [])
 
 
-def judge(mutants: list[Mutant], minutes: float) -> list[tuple[Mutant, bool]]:
-    """One after another until the time is up, by the tests that pass on the code as it is."""
+def judge(mutants: list[Mutant], minutes: float) -> list[tuple[Mutant, str]]:
+    """One after another until the time is up -> each with the test that caught it, or nothing."""
     for package in PACKAGES:
         shutil.rmtree(TREE / package, ignore_errors=True)
         shutil.copytree(SOURCES / package / package, TREE / package / package)
-    taken: dict[tuple[str, bool], float] = {}  # s of each file of tests on the code as it is; inf: it fails
     verdicts, end = [], time.monotonic() + 60.0 * minutes
     for k, mutant in enumerate(mutants):
-        tests, target, off = [], TREE / mutant.path, "compiled" in mutant.path.parts
-        for test in judges(mutant):
-            if (test, off) not in taken:
-                failed, _, seconds = judged([test], mutant, 4.0 * LONGEST)
-                taken[test, off] = float("inf") if failed else seconds
-            if sum(taken[t, off] for t in [*tests, test]) <= LONGEST:
-                tests.append(test)
         if time.monotonic() > end:
             break
-        if not tests:
-            print(f"not judged: {mutant.path}: no tests of at most {LONGEST:g} s pass on the code as it is", flush=True)
-            continue
+        target, start, by = TREE / mutant.path, time.monotonic(), []
         text = target.read_text()
         lines = text.splitlines()
         lines[mutant.line - 1] = mutant.after
         target.write_text("\n".join(lines) + "\n")
         try:
-            caught, how, seconds = judged(tests, mutant, PATIENCE[0] + PATIENCE[1] * sum(taken[t, off] for t in tests))
+            for test in judges(mutant):
+                left = PATIENCE - (time.monotonic() - start)
+                by = by or (failed([test], "compiled" in mutant.path.parts, left) if left > 0.0 else [])
         finally:
             target.write_text(text)
-        verdicts.append((mutant, caught))
-        said = f"caught by {how}" if caught else "SURVIVED"
-        print(f"{k + 1}/{len(mutants)} {mutant.path.name}:{mutant.line} {said}, {seconds:.0f} s", flush=True)
-    return verdicts
+        verdicts.append((mutant, by[0] if by else ""))
+        said = f"caught by {by[0]}" if by else "SURVIVED"
+        took = time.monotonic() - start
+        print(f"{k + 1}/{len(mutants)} {mutant.path.name}:{mutant.line} {said}, {took:.0f} s", flush=True)
+    wrong = {}
+    for compiled in (False, True):
+        used = sorted({by for mutant, by in verdicts if by and ("compiled" in mutant.path.parts) == compiled})
+        wrong[compiled] = failed(used, compiled, 60.0 * PATIENCE) if used else []
+    return [(mutant, by) for mutant, by in verdicts if by not in wrong["compiled" in mutant.path.parts]]
 
 
-def page(verdicts: list[tuple[Mutant, bool]], seed: int) -> str:
+def page(verdicts: list[tuple[Mutant, str]], seed: int, count: int) -> str:
     rows = []
     for column in ("part", "kind"):
-        counts = Counter((getattr(m, column), caught) for m, caught in verdicts)
+        counts = Counter((getattr(m, column), bool(by)) for m, by in verdicts)
         for name in dict.fromkeys(name for name, _ in counts):
             n, hit = counts[name, True] + counts[name, False], counts[name, True]
             rows.append(f"| {column}: {name} | {n} | {hit} | {hit / n:.0%} |")
@@ -190,8 +177,10 @@ def page(verdicts: list[tuple[Mutant, bool]], seed: int) -> str:
         for m, c in verdicts
         if not c
     ]
-    hit, n = sum(caught for _, caught in verdicts), max(len(verdicts), 1)
-    return PAGE.format(seed=seed, hit=hit, n=n, share=hit / n, rows="\n".join(rows), left="\n".join(left) or "None.")
+    hit, n = sum(bool(by) for _, by in verdicts), max(len(verdicts), 1)
+    return PAGE.format(
+        seed=seed, count=count, hit=hit, n=n, share=hit / n, rows="\n".join(rows), left="\n".join(left) or "None."
+    )
 
 
 PAGE = """\
@@ -201,7 +190,7 @@ Made by `make mutants`, seed {seed}: one operator, condition or number changed i
 are named like the module, import it or stand beside it judge, not all of them (`tools/mutants.py`). The compiled
 recursion is judged as Python beside its readable twin.
 
-**{hit} of {n} caught, {share:.0%}.**
+**{hit} of {n} caught, {share:.0%}**; {count} were drawn, the others not judged within the time.
 
 | | judged | caught | share |
 | :-- | --: | --: | --: |
@@ -219,11 +208,10 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="", help="part of a path, such as core/estimators")
     parser.add_argument("--minutes", type=float, default=120.0, help="no new one is begun after them")
-    parser.add_argument("--to", type=Path, default=ROOT / "docs" / "mutants.md")
     given = parser.parse_args()
     verdicts = judge(drawn(given.mutants, given.seed, given.only), given.minutes)
-    given.to.write_text(page(verdicts, given.seed))
-    print(f"{given.to}: {sum(caught for _, caught in verdicts)} of {len(verdicts)} caught")
+    (ROOT / "docs" / "mutants.md").write_text(page(verdicts, given.seed, given.mutants))
+    print(f"docs/mutants.md: {sum(bool(by) for _, by in verdicts)} of {len(verdicts)} caught")
 
 
 if __name__ == "__main__":
