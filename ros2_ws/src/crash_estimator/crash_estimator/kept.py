@@ -61,14 +61,14 @@ class Kept:
 
         time_ns: (k,) increasing. Samples of another test, or of one whose clock went wrong, do not.
         """
+        if number >= self.end:  # the next ones, as nearly always
+            return not self.end or bool(self.time_ns[self.end - 1] < time_ns[0])
         end = number + len(time_ns)
-        before = self.seen[: min(number, self.end)][::-1]
+        before = self.seen[:number][::-1]
         if len(before):
-            last = len(before) - 1 - int(before.argmax())  # which stops at the first, mostly at once
+            last = number - 1 - int(before.argmax())  # which stops at the first, mostly at once
             if self.seen[last] and self.time_ns[last] >= time_ns[0]:
                 return False
-        if number >= self.end:
-            return True
         there = self.seen[number : min(end, self.end)]
         if not np.array_equal(self.time_ns[number : number + len(there)][there], time_ns[: len(there)][there]):
             return False
