@@ -124,7 +124,7 @@ def make_layout(
             b.add("offset", 0.0, max(record.offset_std[q], 1e-9))
         felt = [q for q, output in enumerate(outputs) if output.quantity == "acceleration"]
         peak = np.nanmax(np.abs(record.measured), axis=0)
-        drifts.append({q: b.add("drift", 0.0, max(DRIFT * peak[q], 1e-9)) for q in felt})
+        drifts.append({q: _bounded(b, "drift", max(DRIFT * peak[q], 1e-9)) for q in felt})
         modes.append(_modes(b, structure, record, attached))
         kicks.append(_kicks(b, structure, magnitudes.measured[r]))
     return Layout(
@@ -207,7 +207,12 @@ def _weighed(b: Builder, structure: Structure) -> dict[int, int]:
     """Errors of the masses, where anything tells of them: of one body alone, M a = F hides a mass in the law."""
     free = [k for k, body in enumerate(structure.bodies) if body.free]
     told = len(free) > 1 or any(structure.bodies[k].fixed for k in structure.equations)
-    return {k: b.add(f"{structure.bodies[k].name}.mass", 0.0, WEIGHED_TO) for k in free if told}
+    return {k: _bounded(b, f"{structure.bodies[k].name}.mass", WEIGHED_TO) for k in free if told}
+
+
+def _bounded(b: Builder, name: str, std: float) -> int:
+    """An error within three standard deviations: what a wrong model leaves is no reason for a larger one."""
+    return b.add(name, 0.0, std, low=-3.0 * std, high=3.0 * std)
 
 
 def _modes(b: Builder, structure: Structure, record: ObservedRecord, attached: dict[str, int]) -> dict[int, int]:

@@ -53,15 +53,13 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
     """The effects that a structure lacks, in the band below its vibration. Raises ModelError where it names an effect
     that there is not."""
     path = _selected(structure, records, effects)
-    below = np.inf
-    while not (path.final.white or out_of_time()):
-        left = analyse(path.as_recorded)
-        vibration = vibrates_from(left, records)
-        if vibration >= below or left.mean_square >= THRESHOLDS.real_structure:
-            break
-        below, records = vibration, [record.in_band(vibration) for record in records]
-        path = _selected(structure, records, effects)
-    return path
+    if path.final.white or out_of_time():
+        return path
+    left = analyse(path.as_recorded)
+    vibration = vibrates_from(left, records)
+    if vibration == np.inf or left.mean_square >= THRESHOLDS.real_structure:
+        return path
+    return _selected(structure, [record.in_band(vibration) for record in records], effects)
 
 
 def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
