@@ -1,4 +1,4 @@
-.PHONY: help demo lint check test bags thesis benchmark benchmark-effects benchmark-second benchmark-outside benchmark-coverage chaos endurance fuzz clean
+.PHONY: help demo lint check test bags thesis benchmark benchmark-effects benchmark-second benchmark-outside benchmark-coverage chaos endurance fuzz mutants clean
 
 help: # what there is to make
 	@sed -n 's/^\([a-z-]*\):.*# /make \1	/p' Makefile
@@ -38,8 +38,8 @@ test: lint # all tests, style and types first; some of them with PYTEST_ARGS="-k
 bags: # the simulated recordings in bags/, made anew
 	@tools/run crash_replay synthesize --all --to bags
 
-thesis: # the thesis's simulated experiments run again: docs/thesis.md
-	@tools/env python -m crash_estimator.thesis
+thesis: # the thesis's experiments run again: docs/thesis.md; with measured tests in DATA=FOLDER, which do not come with the project
+	@tools/env python -m crash_estimator.thesis $(if $(DATA),--data "$(DATA)")
 
 benchmark: # every promised speed beside its reference, 8 minutes: docs/benchmark.md; ARGS="--quick" writes out/benchmark.md
 	@tools/setup
@@ -66,6 +66,9 @@ endurance: # a million samples through every method, 500 tests and 500 passes th
 
 fuzz: # 20 000 wrong inputs on every way in: docs/fuzz.md; ARGS="--seed 2", or "--replay out/fuzz/FILE" for one that failed
 	@tools/env python -m crash_estimator.fuzz.command $(ARGS)
+
+mutants: # what share of 200 one-line mistakes the tests catch: docs/mutants.md; ARGS="--seed 2", --mutants, --only core/estimators, --minutes
+	@tools/env python tools/mutants.py $(ARGS)
 
 clean: # removes what the set-up installed and built, and what the programs wrote
 	rm -rf .venv .setup out ros2_ws/build ros2_ws/install ros2_ws/log

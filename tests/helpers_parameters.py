@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from crash_estimator.core.methods import METHODS
 from crash_estimator.nodes import diagnosis_parameters, estimator_parameters, viewer_parameters
-from crash_estimator.nodes.estimator_parameters import DAMPING_AFTER, PREFIX, settings_of
+from crash_estimator.nodes.estimator_parameters import DAMPING_AFTER, PREFIX, PRESET, settings_of
 from crash_replay import record_parameters, replay_parameters
 from crash_replay.node_parameters import Allowed, expected
 
@@ -36,6 +36,7 @@ def _settings() -> dict[str, Allowed]:
             rows.setdefault((name, allowed), []).append(method)
     of_most = f"{PREFIX}damping_after"
     rows[of_most, DAMPING_AFTER._replace(live=True)] = ["all but effective_mass"]
+    rows[f"{PREFIX}preset", PRESET] = ["all"]
     return {f"`{name}` ({', '.join(methods)})": allowed for (name, allowed), methods in rows.items()}
 
 

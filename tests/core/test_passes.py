@@ -8,7 +8,7 @@ from test_gauss_newton import BOTH, coloured
 
 from crash_estimator.cli.estimate import _parser
 from crash_estimator.core.methods import make_estimator
-from crash_estimator.core.passes import MOST_PASSES, SETTLED, repeats, settle
+from crash_estimator.core.passes import MOST_PASSES, SETTLED, most_passes, repeats, settle
 
 SETTINGS = dict(p=1, q=1, forgetting=1.0, noise_memory=1e3)
 
@@ -55,5 +55,9 @@ def test_only_a_noise_model_that_is_to_be_found_is_repeated():
     assert repeats(make_estimator(oscillator(**BOTH), test, "gauss_newton"))
     assert not repeats(make_estimator(oscillator(**BOTH), test, "gauss_newton", p=0, q=0))
     assert not repeats(make_estimator(oscillator(**BOTH), test, "rls"))
-    assert _parser().parse_args(["x", "--model", "m"]).passes == MOST_PASSES
     assert SETTLED < 1.0
+
+
+def test_the_printed_recursion_goes_over_a_record_once():
+    given = [_parser().parse_args(["x", "--model", "m", *more]).passes for more in ([], ["--passes", "3"])]
+    assert [[most_passes(n, preset) for n in given] for preset in ("ours", "thesis")] == [[MOST_PASSES, 3], [1, 3]]

@@ -7,10 +7,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.benchmarks.coverage import LIMIT, looks, model_for, recorded, rows, simulated
+from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.core.regressor_errors import Consequence, MotionErrors, none_yet
+from crash_estimator.core.structure import Body, Coefficient, Element, Structure
 from crash_estimator.model_file import load_model
-from crash_replay.recording import Recording
+from crash_replay.recording import Channel, Recording, Test
 
 B, P, Q = 2, 3, 2
 VARIANCES = np.array([0.3, 0.1]), np.array([2e-3, 5e-3]), np.array([0.04, 0.0])  # zero, density, velocity
@@ -119,3 +121,51 @@ def test_what_is_integrated_before_contact_tells_nothing_of_a_stiffness(method):
     k = estimator.description.parameters.index("rib_spine.stiffness")
     assert estimate.crush[1] != 0.0
     assert_allclose(estimate.parameters[k], 5.0e4, rtol=1e-12)  # afmm's is a mean of equal values
+
+
+def oscillating(seed=0):
+    """A mass on a spring and a damper, 20 samples at rest before the impact; its crush is integrated from noise too."""
+    rng, dt, at_rest = np.random.default_rng(seed), 1e-3, 20
+    t = np.arange(-at_rest, 100) * dt
+    values = np.where(t < 0.0, 0.0, -300.0 * np.sin(30.0 * t)) + rng.normal(0.0, 20.0, len(t))
+    test = Test("one", (Channel("a", "acceleration", "car"),), initial_velocity={"car": 10.0})
+    return Recording(test, np.round(t * 1e9).astype(np.int64), values[:, None])
+
+
+def spring_estimator(recording, method, **settings):
+    """Of K and C, from 800 N/m and 1 N s/m."""
+    law = [Coefficient(value, estimated=True, std=0.5 * value) for value in (800.0, 1.0)]
+    bodies = (Body("car", 1.0, ("a",), noise=20.0), Body("wall", fixed=True))
+    structure = Structure("one", bodies, (Element("spring", ("car", "wall"), *law),))
+    return make_estimator(structure, recording.test, method, **settings)
+
+
+def test_the_printed_recursion_takes_the_integrated_motion_as_true():
+    """5.3 on the crush and rate as they were integrated, from the first sample on; ours is another."""
+    recording, settings = oscillating(), {"preset": "thesis", "forgetting": 0.95}
+    estimates = run(spring_estimator(recording, "rls", **settings), recording.samples())
+    found = [e for e in estimates if e.time_ns > 0]
+    theta, gamma, big_lambda = np.array([800.0, 1.0]), 1.0, 20.0**2
+    r = np.diag([1.0 / 400.0**2, 1.0 / 0.5**2])
+    for e in found:
+        psi, gamma = -np.array([e.crush[0], e.rate[0]]), 1.0 / (0.95 / gamma + 1.0)
+        error = e.measured[0] - psi @ theta
+        big_lambda += gamma * (error**2 - big_lambda)
+        r = r + gamma * (np.outer(psi, psi) / big_lambda - r)
+        theta = theta + gamma * np.linalg.solve(r, psi) * error / big_lambda
+        assert_allclose(e.parameters, theta, rtol=1e-9)
+    held = run(spring_estimator(recording, "rls", regressor_errors=True, **settings), recording.samples())
+    assert np.abs(held[-1].parameters / theta - 1.0).max() > 1e-4
+
+
+@pytest.mark.parametrize("more", [{}, {"damping_after": 0.5}])
+@pytest.mark.parametrize("method", ["rls", "mrls", "kalman", "constrained_kalman", "gauss_newton", "afmm"])
+def test_the_setting_says_whether_anything_is_added_to_the_sigma(method, more):
+    recording, added = oscillating(), {}
+    for counted in (False, True):
+        estimator = spring_estimator(recording, method, compiled=False, regressor_errors=counted, **more)
+        state = estimator.init()
+        for sample in recording.samples():
+            state, _ = estimator.step(state, sample)
+        added[counted] = state.update.beside
+    assert (np.asarray(added[False]) == 0.0).all() and (np.diagonal(added[True]) != 0.0).any()

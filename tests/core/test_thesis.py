@@ -12,10 +12,22 @@ from crash_estimator.thesis.page import write_page
 @pytest.mark.parametrize(("case", "settings"), [("frontal", FRONTAL), ("side", SIDE)])
 def test_mrls_leaves_the_noise_and_rls_more(case, settings):
     """Median ratio of error to noise variance: MRLS 0.65 to 1.15 in every equation, RLS 1.3 times it in two."""
-    found = ratios(getattr(cases, case)(), case, settings, seeds=20)
+    found = ratios(getattr(cases, case)(shares=cases.EQUAL), case, settings, seeds=20)
     mrls, rls = found.median("mrls"), found.median("rls")
     assert ((mrls > 0.65) & (mrls < 1.15)).all(), mrls
     assert (rls > 1.3 * mrls).sum() >= 2, rls / mrls
+
+
+@pytest.mark.parametrize(("case", "settings"), [("frontal", FRONTAL), ("side", SIDE)])
+def test_mrls_beats_rls_by_more_than_in_the_thesis_at_its_own_noise(case, settings):
+    """With the six shares of tables 5.1 and 5.2, as we have it and as printed, in every equation.
+
+    In the thesis RLS leaves 1.05 to 3.4 times what MRLS leaves; where that is near 1 we ask for twice.
+    """
+    found = ratios(getattr(cases, case)(), case, settings, seeds=9)
+    for kind in ("", " as printed"):
+        assert (found.median(f"rls{kind}") > 2.0 * found.median(f"mrls{kind}")).all()
+    assert (np.abs(np.median(found.means["mrls"], axis=0)) < np.abs(np.median(found.means["rls"], axis=0))).all()
 
 
 @pytest.mark.parametrize("offsets", [False, True])
@@ -36,7 +48,7 @@ def test_a_noise_model_leaves_the_stiffness_and_takes_most_of_the_autocorrelatio
     found = noise_orders(which, seeds=20)
     assert np.median(found.apart) < 1.0 and np.median(found.within) > 0.85
     assert np.median(found.rms[1, 2]) < np.median(found.rms[0, 0])
-    assert not found.white[0, 0].any()
+    assert not found.uncorrelated[0, 0].any()
     assert np.median(found.q[1, 2]) < 0.2 * np.median(found.q[0, 0])
     assert np.median(found.inside[1, 2]) > 0.8 > 0.6 > np.median(found.inside[0, 0])
 
@@ -49,7 +61,7 @@ def test_noise_of_the_model_s_kind_is_left_white(which):
     """
     found = noise_orders(which, seeds=20, noise=cases.arma)
     assert np.median(found.apart) < 1.0 and np.median(found.within) > 0.85
-    assert np.mean(found.white[1, 2]) >= 0.85 and not found.white[0, 0].any()
+    assert np.mean(found.uncorrelated[1, 2]) >= 0.85 and not found.uncorrelated[0, 0].any()
 
 
 def test_two_tests_of_one_car_have_one_noise_model():

@@ -48,6 +48,16 @@ def test_holes_numbers_of_coarse_steps_and_what_has_no_noise_are_not_clipped():
     assert not clipped(noisy).any() and not clipped(np.full(50, np.nan)).any() and not clipped(noisy[:3]).any()
 
 
+def test_the_top_of_a_filtered_pulse_is_no_end_of_a_range():
+    """Its numbers have steps: at the top some samples in a row are the same."""
+    time = np.arange(2000) * 1e-4
+    pulse = 300.0 * np.sin(np.pi * np.clip(time / 0.1, 0.0, 1.0)) ** 2
+    noisy = np.round((pulse + 0.2 * np.sin(2.0 * np.pi * 90.0 * time)) / 0.15) * 0.15
+    top = noisy == noisy.max()
+    assert np.convolve(top, np.ones(4), "valid").max() == 4, "the case that is meant"
+    assert not clipped(noisy).any()
+
+
 def test_a_right_model_of_a_clipped_recording_is_adequate(padded):
     found = diagnose(load_model("side_dummy"), [at_most(padded, "rib_ay", 0.7)])
     assert found.verdict == "adequate" and "rib_ay of side_dummy_padded is clipped" in found.text, found.text

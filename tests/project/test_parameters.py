@@ -43,7 +43,17 @@ def test_every_setting_of_a_method_is_a_parameter(method):
     assert set(SETTINGS[recipe.kind]) == set(of_class)
     defaults = settings_in({name: allowed.default for name, allowed in table.items()})
     assert defaults | of_class == defaults
-    assert {name.removeprefix(PREFIX) for name in table} - set(of_class) <= {"damping_after"}
+    assert {name.removeprefix(PREFIX) for name in table} - set(of_class) <= {"damping_after", "preset"}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_preset_sets_the_defaults_and_no_more(method):
+    """Each is a setting that the method has; what a preset leaves alone is as without it."""
+    ours, printed = settings_of(method), settings_of(method, "thesis")
+    changed = {name.removeprefix(PREFIX) for name in ours if ours[name] != printed[name]} - {"preset"}
+    assert changed == {name for name, value in METHODS[method].thesis.items() if value != ours[PREFIX + name].default}
+    for name, allowed in printed.items():
+        assert checked(printed, name, allowed.default) == allowed.default
 
 
 @pytest.mark.parametrize("node", TABLES)

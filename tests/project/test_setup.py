@@ -224,6 +224,9 @@ def recipe(*arguments: str) -> list[str]:
         (["demo", "RECORDING=../a b"], 'tools/run crash_estimator demo --recording "../a b"'),
         (["demo", "RECORDING=a", "WITH=b c"], 'tools/run crash_estimator demo --recording "a" --with "b c"'),
         (["bags"], "tools/run crash_replay synthesize --all --to bags"),
+        (["mutants", "ARGS=--seed 2"], "tools/env python tools/mutants.py --seed 2"),
+        (["thesis"], "tools/env python -m crash_estimator.thesis"),
+        (["thesis", "DATA=../a b"], 'tools/env python -m crash_estimator.thesis --data "../a b"'),
     ],
 )
 def test_make_runs(arguments, command):

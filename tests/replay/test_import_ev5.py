@@ -5,6 +5,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from test_import_nhtsa import SENSORS, record, write_folder
 
 from crash_replay.readers import read_source
+from crash_replay.recording import RecordingError
 
 
 def test_comment_lines_blank_numbers_and_statuses(tmp_path):
@@ -71,3 +72,21 @@ def test_vehicles_are_those_of_the_sensors_too(tmp_path):
     )
     file.write_text(file.read_text().replace("----- VEHICLE -----\n1|16|03|2018|M|4S|V|4CIF|2.5|AF|1500|1\n", ""))
     assert {"vehicle1_car_ax", "vehicle2_car_ax"} <= set(read_source(tmp_path).test.channel_names)
+
+
+def test_the_header_is_read_in_its_folder_or_in_data_and_nowhere_else(tmp_path):
+    """As submitted: in a folder DATA. Another folder's header is another test's; a file named DATA is no folder."""
+    inner = tmp_path / "test" / "DATA"
+    inner.mkdir(parents=True)
+    write_folder(inner)
+    other = tmp_path / "test" / "ANOTHER"
+    other.mkdir()
+    (other / "v11.EV5").write_text("not this one")
+    assert read_source(tmp_path / "test").test.id == read_source(inner).test.id
+    (tmp_path / "plain").mkdir()
+    write_folder(tmp_path / "plain")
+    for name in ("v99.EV5",):
+        (tmp_path / "plain" / name).rename(tmp_path / "plain" / "kept")
+    (tmp_path / "plain" / "DATA").write_text("a file")
+    with pytest.raises(RecordingError):
+        read_source(tmp_path / "plain")

@@ -1,11 +1,14 @@
 """ISO-MME folders, as ISO/TS 13499 describes them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_replay.readers import read_source
 from crash_replay.readers.codes.isomme import channel_of
+from crash_replay.readers.isomme import _masses
 from crash_replay.recording import RecordingError
 
 MME = """\
@@ -223,3 +226,13 @@ def test_folders_at_fault(tmp_path):
     assert error() == f"{tmp_path}/Channel: no channel files (NAME.001, NAME.002, ...)"
     (tmp_path / "other.mme").touch()
     assert error() == f"{tmp_path}: expected one .mme header, found T7.MME, other.mme"
+
+
+@pytest.mark.parametrize(
+    ("stated", "masses"), [("1200", {"car": 1200.0}), ("0", {}), ("0.5", {"car": 0.5}), ("NOVALUE", {})]
+)
+def test_a_mass_is_a_number_above_0(stated, masses):
+    track = SimpleNamespace(code="1VEHC", channel=SimpleNamespace(body="car"))
+    rib = SimpleNamespace(code="1RIBS", channel=SimpleNamespace(body="driver_rib"))
+    header = SimpleNamespace(get={"mass test object 1": stated}.get)
+    assert _masses(header, [track, rib]) == masses

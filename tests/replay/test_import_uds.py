@@ -7,6 +7,8 @@ from helpers_uds import CODES, uds_file, write_uds
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_replay.readers import read_source
+from crash_replay.readers.codes.nhtsa import code_of_attachment, code_of_status
+from crash_replay.readers.codes.nhtsa_library import DATA_STATUS, SENSOR_ATTACHMENTS
 from crash_replay.readers.uds import _floats
 from crash_replay.recording import RecordingError
 
@@ -111,3 +113,22 @@ def test_half_empty_garbage_is_refused_in_one_line(tmp_path):
         (folder / "x.uds").write_bytes(b"UDS-1992    " + rng.bytes(14) + b"IEEE MET" + rng.bytes(4000))
         with pytest.raises(RecordingError):
             read_source(folder)
+
+
+@pytest.mark.parametrize(("number", "said"), [(7292, "7292"), (0, "A-12")])
+def test_a_test_without_a_number_goes_by_its_name(tmp_path, number, said):
+    record, values = records()[0]
+    data = uds_file(record.split("|"), values, number, "IEEE")
+    named = data.replace(str(number).rjust(12).encode(), b"A-12".rjust(12), 1)
+    assert named != data
+    (tmp_path / "v07292.001").write_bytes(named)
+    assert read_source(tmp_path).test.id == said
+
+
+def test_words_of_the_library_are_its_codes():
+    for known, code_of in ((SENSOR_ATTACHMENTS, code_of_attachment), (DATA_STATUS, code_of_status)):
+        by_words = {}
+        for code, words in known.items():
+            by_words.setdefault(words, code)
+        assert len(by_words) > 5 and all(code_of(words) == code for words, code in by_words.items())
+        assert code_of("NO SUCH WORDS") == "NO SUCH WORDS"

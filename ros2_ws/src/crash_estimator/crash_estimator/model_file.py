@@ -206,6 +206,7 @@ class ModelFile(Part):
     bodies: dict[Text, BodyPart] = Field(min_length=1, max_length=MOST_PARTS)
     elements: dict[Text, ElementPart] = Field(min_length=1, max_length=MOST_PARTS)
     effects: list[EffectPart] = Field([], max_length=MOST_PARTS)
+    preset: Literal["ours", "thesis"] = "ours"  # of the methods' settings
 
     def structure(self) -> Structure:
         return Structure(
@@ -213,6 +214,7 @@ class ModelFile(Part):
             tuple(part.body(name) for name, part in self.bodies.items()),
             tuple(part.element(name) for name, part in self.elements.items()),
             tuple(part.effect() for part in self.effects),
+            preset=self.preset,
         )
 
 

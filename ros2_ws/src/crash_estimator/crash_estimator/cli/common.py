@@ -44,10 +44,13 @@ def effects_of(arguments: argparse.Namespace) -> dict[str, Effect]:
 
 
 def parse_settings(pairs: list[str]) -> dict[str, Any]:
-    """["forgetting=0.98", "m=5"] -> {"forgetting": 0.98, "m": 5}."""
-    settings = {}
+    """["forgetting=0.98", "m=5", "preset=thesis"] -> {"forgetting": 0.98, "m": 5, "preset": "thesis"}."""
+    settings: dict[str, Any] = {}
     for pair in pairs:
         name, equals, text = pair.partition("=")
+        if name.strip() == "preset":
+            settings["preset"] = text.strip()
+            continue
         try:
             if not equals:
                 raise ValueError

@@ -39,8 +39,9 @@ def _parser() -> Parser:
         help="find the masses that go with the accelerometers first, the other parameters with them",
     )
     parser.add_argument(
-        "--passes", metavar="N", type=_passes, default=10,
-        help="gauss_newton goes over the record until it settles, N times at most; 1: once, as a node does; default 10",
+        "--passes", metavar="N", type=_passes,
+        help="gauss_newton goes over the record until it settles, N times at most; 1: once, as a node does; default "
+        "10, with preset=thesis 1",
     )  # fmt: skip
     add_effects_option(parser)
     parser.add_argument("--json", metavar="FILE", help="write everything that was found")

@@ -19,7 +19,10 @@ from .structure import Structure
 
 
 class Method(Protocol):
-    """A recursive estimation method: frozen settings, `init`, `update`."""
+    """A recursive estimation method: frozen settings, `init`, `update`.
+
+    One with a setting `regressor_errors` that is false gets a regression whose motion is taken as true.
+    """
 
     def init(self, equations: int): ...
 
@@ -42,7 +45,7 @@ class Estimator:
     def __init__(self, structure: Structure, test: Test, method: Method, method_name: str):
         self.kinematics = Kinematics(structure, test)
         self.contact = Contact(structure)
-        self.regressor = Regressor(structure)
+        self.regressor = Regressor(structure, getattr(method, "regressor_errors", True))
         self.start = self.kinematics.initial_displacement, self.kinematics.initial_velocity
         self.structure = structure
         self.method = method

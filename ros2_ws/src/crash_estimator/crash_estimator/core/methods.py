@@ -13,6 +13,7 @@ from .effects.channels import Corrected, known_errors
 from .effects.effect import Effect
 from .estimate import Description, Estimate
 from .estimator import Estimator, Method
+from .estimators import afmm, effective_mass, gauss_newton, kalman, rls
 from .estimators.afmm import Afmm
 from .estimators.damping_later import DampingLater
 from .estimators.effective_mass import EffectiveMass, MassSettings
@@ -52,21 +53,28 @@ class Recipe(NamedTuple):
     settings: dict[str, float | int | bool] = {}
     structure: Callable[[Structure], Structure] = lambda structure: structure
     estimator: Callable[[Structure, Test, Method, str], AnyEstimator] = Estimator
+    thesis: dict[str, float | int | bool] = {}  # settings with which it is the recursion that the thesis prints
+
+    def defaults(self, preset: str = "ours") -> dict[str, float | int | bool]:
+        """Settings that differ from the class's, by preset."""
+        return self.settings | (self.thesis if preset == "thesis" else {})
 
 
 METHODS: dict[str, Recipe] = {
-    "rls": Recipe(Rls),
-    "mrls": Recipe(Rls, {"m": 5}),
-    "kalman": Recipe(Kalman, {"constrained": False, "offsets": False}, elastic),
-    "constrained_kalman": Recipe(Kalman),
-    "gauss_newton": Recipe(GaussNewton),
-    "gauss_newton_orders": Recipe(OrderBank),
-    "afmm": Recipe(Afmm),
-    "effective_mass": Recipe(MassSettings, estimator=_masses),
+    "rls": Recipe(Rls, thesis=rls.THESIS),
+    "mrls": Recipe(Rls, {"m": 5}, thesis=rls.THESIS_MRLS),
+    "kalman": Recipe(Kalman, {"constrained": False, "offsets": False}, elastic, thesis=kalman.THESIS),
+    "constrained_kalman": Recipe(Kalman, thesis=kalman.THESIS),
+    "gauss_newton": Recipe(GaussNewton, thesis=gauss_newton.THESIS),
+    "gauss_newton_orders": Recipe(OrderBank, thesis={"printed": True}),
+    "afmm": Recipe(Afmm, thesis=afmm.THESIS),
+    "effective_mass": Recipe(MassSettings, estimator=_masses, thesis=effective_mass.THESIS),
 }
+PRESETS = ("ours", "thesis")
+"""Sets of settings: our own defaults, and each recursion as the thesis prints it."""
 
 
-def make_estimator(
+def make_estimator(  # noqa: PLR0913 - everything that an estimator can be told
     structure: Structure,
     test: Test,
     method: str,
@@ -74,6 +82,7 @@ def make_estimator(
     effective_mass: bool = False,
     compiled: bool = True,
     effects: Mapping[str, Effect] = EFFECTS,
+    preset: str = "",
     **settings,
 ) -> AnyEstimator:
     """An estimator of the structure's parameters (effective_mass: of its masses) on a test's channels.
@@ -81,13 +90,17 @@ def make_estimator(
     method: a key of METHODS; settings: fields of that method's dataclass, such as forgetting=0.98; damping_after: hold
     each damping at its initial value until its element's stiffness is known to this share of its value; effective_mass:
     find the masses first, and the method's parameters with them; compiled: use the compiled form where there is one (it
-    agrees with the readable one but for rounding); effects: the table that the structure's effects are in.
+    agrees with the readable one but for rounding); effects: the table that the structure's effects are in; preset: one
+    of PRESETS, what the settings are that are not given; "": the structure's.
     Raises ModelError or RecordingError where the model does not fit the test, or a setting does not exist.
     """
     if method not in METHODS:
         near = get_close_matches(method, METHODS, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise ModelError(f"there is no method {method!r}, only {', '.join(METHODS)}{hint}")
+    preset = preset or structure.preset
+    if preset not in PRESETS:
+        raise ModelError(f"there is no preset {preset!r}, only {', '.join(PRESETS)}")
     errors = known_errors(structure, test, effects)
     if errors is not None:
         applied(
@@ -96,17 +109,20 @@ def make_estimator(
         left = tuple(e for e in structure.effects if e.coefficient is None or not effects[e.type].distorts)
         structure = replace(structure, effects=left)
         return Corrected(
-            make_estimator(structure, test, method, damping_after, effective_mass, compiled, effects, **settings),
+            make_estimator(
+                structure, test, method, damping_after, effective_mass, compiled, effects, preset, **settings
+            ),
             errors,
         )
     if effective_mass or method == "effective_mass":
         _check_masses_alone(structure, effects)
     if effective_mass and method != "effective_mass":
-        masses = EffectiveMass(structure, test, MassSettings(theta_settings(structure)))
+        given = METHODS["effective_mass"].defaults(preset)
+        masses = EffectiveMass(structure, test, MassSettings(theta_settings(structure), **given))
         return MassFirst(
             structure,
             masses,
-            lambda s: make_estimator(s, test, method, damping_after, False, compiled, effects, **settings),
+            lambda s: make_estimator(s, test, method, damping_after, False, compiled, effects, preset, **settings),
         )
     recipe = METHODS[method]
     known = [f.name for f in fields(recipe.kind) if f.init and f.name != "settings"]
@@ -116,10 +132,10 @@ def make_estimator(
             hint = f"; did you mean {near[0]!r}?" if near else ""
             raise ModelError(f"method {method} has no setting {name!r}, only {', '.join(known)}{hint}")
     structure = applied(recipe.structure(structure), test, effects)
-    chosen = recipe.kind(theta_settings(structure), **recipe.settings | settings)
+    chosen = recipe.kind(theta_settings(structure), **recipe.defaults(preset) | settings)
     if damping_after is not None and recipe.estimator is Estimator:
         chosen = DampingLater(chosen, damping_after)
-    if compiled and structure.first_order and isinstance(chosen, (Rls, Kalman)):
+    if compiled and structure.first_order and isinstance(chosen, (Rls, Kalman)) and chosen.compilable:
         from .compiled.estimator import CompiledEstimator  # late: numba takes long to import, and names need it not
 
         return CompiledEstimator(structure, test, chosen, method)

@@ -49,6 +49,11 @@ class Passes(NamedTuple):
         return f"{len(self.moved) + 1} passes over the record, parameters moved by {moves} sigma: {end}"
 
 
+def most_passes(given: int | None, preset: str) -> int:
+    """How many at most: as given; else the recursion that the thesis prints goes over a record once."""
+    return given or (1 if preset == "thesis" else MOST_PASSES)
+
+
 def repeats(estimator: Any) -> bool:
     """Whether its method has a noise model that a further pass can begin with."""
     method = getattr(estimator, "method", None)

@@ -92,7 +92,10 @@ class Further:
 class Regressor:
     """Turns motion and contact into the regression."""
 
-    def __init__(self, structure: Structure):
+    def __init__(self, structure: Structure, regressor_errors: bool = True):
+        """regressor_errors: the integrated motion errs, and a coefficient is held until its crush is known; else the
+        motion is taken as true."""
+        self.regressor_errors = regressor_errors
         parameters = structure.element_parameters
         self.actions = Actions(structure) if structure.actions else None
         self.factors = [(k, element.factor) for k, element in enumerate(structure.elements) if element.factor]
@@ -153,14 +156,8 @@ class Regressor:
             np.zeros((len(self.own_offset), len(self.velocity_variance), 3)),
             motion.sensors[1], motion.sensors[0] * motion.dt, self.velocity_variance, motion.time,
         )  # fmt: skip
-        of_crush, of_rate = errors.spread(self.crush_of_body)
-        vague = np.where(
-            self.is_stiffness,
-            (np.abs(law.lever) < KNOWN_FROM * of_crush)[self.element],
-            (np.abs(motion.rate) < KNOWN_FROM * of_rate)[self.element] & self.is_damping,
-        )
         touched = self.estimated & carries
-        active = touched & ~vague
+        active = touched & ~self._vague(motion, law, errors) if self.regressor_errors else touched
         known = self.share @ (forces.per_unit @ self.value + shift)
         measured = motion.measured
         if motion.applied is not None:
@@ -186,10 +183,20 @@ class Regressor:
             Regression(
                 known, gradient, measured, active, walk, noise, motion.dt, motion.time,
                 self.own_offset + 0.5 * motion.time**2 * by_d + motion.time * by_u, motion.offset_variance,
-                errors._replace(gradient=np.stack([self.own_offset, likely_u, likely_d], axis=-1)),
+                errors._replace(gradient=np.stack([self.own_offset, likely_u, likely_d], axis=-1))
+                if self.regressor_errors else None,
             ),
             forces,
         )  # fmt: skip
+
+    def _vague(self, motion: Motion, law: SpringLaw, errors: MotionErrors) -> np.ndarray:
+        """(p,) Whether what a parameter is multiplied with is not known beyond its own error."""
+        of_crush, of_rate = errors.spread(self.crush_of_body)
+        return np.where(
+            self.is_stiffness,
+            (np.abs(law.lever) < KNOWN_FROM * of_crush)[self.element],
+            (np.abs(motion.rate) < KNOWN_FROM * of_rate)[self.element] & self.is_damping,
+        )
 
     def corrected(self, motion: Motion, theta: np.ndarray, start: tuple[np.ndarray, np.ndarray]) -> Motion:
         """The motion without the errors of channels that are estimated; start: (b,) m and m/s at time zero."""

@@ -33,6 +33,9 @@ white; that of a filtered channel is not, and its sigmas come out too small.
 
 The lag: a method with a memory takes theta as constant within it. Where the model says that theta walks (`drift`), what
 a step of that walk adds is lost to the method until it has followed:  S <- S + diag(walk theta^2)  at every sample.
+
+The setting `regressor_errors` of each method switches all of it off, and `KNOWN_FROM` with it: the motion is then taken
+as true, as the thesis takes it.
 """
 
 from typing import NamedTuple

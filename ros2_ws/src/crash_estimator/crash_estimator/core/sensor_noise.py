@@ -1,8 +1,8 @@
 """How large a sensor's own noise is: from its rest before the impact and from its high-frequency content after it."""
 
-from typing import NamedTuple
-
 import numpy as np
+
+from .noise_spectrum import NoiseSpectrum, noise_spectrum
 
 ENOUGH = 30
 """Samples before the impact from which their scatter is taken seriously."""
@@ -26,34 +26,28 @@ SMALLEST = 1e-6
 """Share of the largest value that noise is taken to be at least: a simulation without any is divided by it too."""
 
 
-class Noise(NamedTuple):
-    std: float  # of one sample
-    samples: float  # that it was found from
-
-
-def sensor_noise(values: np.ndarray, time_ns: np.ndarray, rests: bool) -> Noise:
-    """Standard deviation of one sample, of values (n,).
-
-    A vibrating structure is noisier in the crash than at rest: then that is the floor a model can reach.
-    """
+def sensor_noise(values: np.ndarray, time_ns: np.ndarray, rests: bool) -> NoiseSpectrum:
+    """Of values (n,). A vibrating structure is noisier in the crash than at rest: then that is the floor a model can
+    reach. Rest alone tells whether neighbouring samples are alike."""
     before, after = values[time_ns < 0], values[time_ns >= 0]
-    rest = float(np.std(before, ddof=1)) if rests and len(before) >= ENOUGH else np.nan
-    rate = 1e9 / float(np.median(np.diff(time_ns)))
-    busy = np.nan
-    if len(after) >= ENOUGH and rate < FAST and np.isnan(rest):
+    period = float(np.median(np.diff(time_ns))) * 1e-9
+    rests = rests and len(before) >= ENOUGH
+    at_rest = noise_spectrum(before, period) if rests else NoiseSpectrum(np.nan, 0.0)
+    rest, busy = at_rest.std, np.nan
+    if len(after) >= ENOUGH and period * FAST > 1.0 and not rests:
         busy = _highest_frequencies(after)
-    elif len(after) >= ENOUGH and rate >= FAST:
+    elif len(after) >= ENOUGH and period * FAST <= 1.0:
         busy = by_differences(after)
     if np.isnan(rest) or busy > AGREE * rest:
-        found, count = np.nan_to_num(busy), EFFICIENCY * len(after)
-    elif np.isnan(busy) or busy < rest / AGREE:
-        found, count = rest, len(before)
+        found = NoiseSpectrum(float(np.nan_to_num(busy)), EFFICIENCY * len(after))
+    elif not at_rest.white or np.isnan(busy) or busy < rest / AGREE:
+        found = at_rest
     else:
         n_rest, n_busy = len(before), EFFICIENCY * len(after)
-        found = np.sqrt((n_rest * rest**2 + n_busy * busy**2) / (n_rest + n_busy))
-        count = n_rest + n_busy
+        pooled = np.sqrt((n_rest * rest**2 + n_busy * busy**2) / (n_rest + n_busy))
+        found = NoiseSpectrum(float(pooled), n_rest + n_busy)
     least = max(SMALLEST * float(np.abs(values).max(initial=0.0)), 1e-12)
-    return Noise(max(float(found), least), max(float(count), 2.0))
+    return found._replace(std=max(found.std, least), samples=max(found.samples, 2.0))
 
 
 def _highest_frequencies(values: np.ndarray) -> float:

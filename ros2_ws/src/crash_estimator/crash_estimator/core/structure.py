@@ -40,6 +40,7 @@ class Structure:
     elements: tuple[Element, ...]
     effects: tuple[EffectSpec, ...] = ()
     actions: tuple[Action, ...] = ()  # of the effects, once they are applied
+    preset: str = "ours"  # of the methods' settings, where none is given: see `methods.PRESETS`
 
     def __post_init__(self):
         known = [body.name for body in self.bodies]

@@ -49,6 +49,8 @@ class Ratios(NamedTuple):
     by_method: dict[str, np.ndarray]
     example: dict[str, Run]  # of the first seed
     means: dict[str, np.ndarray]  # error mean over noise standard deviation
+    inputs: tuple[str, ...]  # "cab_barrier.crush", "cab_barrier.rate", ...
+    cross: dict[str, np.ndarray]  # seeds x equations x inputs: correlation of the error with each at lag 0
 
     def median(self, method: str) -> np.ndarray:
         return np.median(self.by_method[method], axis=0)
@@ -61,12 +63,15 @@ class NoiseOrders(NamedTuple):
     q: dict[tuple[int, int], np.ndarray]  # (seeds,) Ljung and Box
     lags: int
     inside: dict[tuple[int, int], np.ndarray]  # (seeds,) share of lags in the 95 % limit
-    white: dict[tuple[int, int], np.ndarray]  # (seeds,)
+    uncorrelated: dict[tuple[int, int], np.ndarray]  # (seeds,) by Ljung and Box at 95 %
     rms: dict[tuple[int, int], np.ndarray]  # (seeds,) error of K/M, 1/s^2
+    fit: dict[tuple[int, int], np.ndarray]  # (seeds,) estimated less assumed acceleration, m/s^2 rms
+    crossed: dict[tuple[int, int], np.ndarray]  # (seeds, 2) share of lags in the 99 % limit, with crush and rate
     apart: np.ndarray  # (seeds,) median over time of |difference| / sigma of the two K/M; of two normals 0.67
     within: np.ndarray  # (seeds,) share of the time within two sigma
     example: dict[tuple[int, int], tuple[Run, EquationValidation]]
     truth: np.ndarray  # (n,) K/M at each sample
+    assumed: np.ndarray  # (n,) m/s^2, acceleration without noise
 
 
 class Covariances(NamedTuple):
@@ -130,25 +135,36 @@ def noise_of(structure: Structure, noise: dict[str, float]) -> np.ndarray:
 
 
 def ratios(scenario: cases.Scenario, model: str, settings: dict, seeds: int) -> Ratios:
-    """RLS and MRLS at the same forgetting (tables 5.1 and 5.2)."""
+    """RLS and MRLS at the same forgetting (tables 5.1 and 5.2), ours and as printed."""
     _, trials = cases.trials(scenario, seeds)
     structure = load_model(FOLDER / f"{model}.yaml")
-    found: dict[str, list] = {"rls": [], "mrls": []}
-    means: dict[str, list] = {"rls": [], "mrls": []}
-    example = {}
+    plain = {"forgetting": settings["forgetting"]}
+    printed = {"preset": "thesis"}
+    ways = {
+        "rls": ("rls", plain), "mrls": ("mrls", settings),
+        "rls as printed": ("rls", plain | printed), "mrls as printed": ("mrls", settings | printed),
+    }  # fmt: skip
+    found: dict[str, list] = {way: [] for way in ways}
+    means: dict[str, list] = {way: [] for way in ways}
+    cross: dict[str, list] = {way: [] for way in ways}
+    example: dict[str, Run] = {}
     for trial in trials:
         known = with_noise(structure, trial.noise)
         sigma = noise_of(structure, trial.noise)
-        for method, given in (("rls", {"forgetting": settings["forgetting"]}), ("mrls", settings)):
-            result = estimate(known, trial.recording, method, **given)
-            error = np.array([e.residual for e in result.estimates if e.time_ns > 0])
-            found[method].append(error.var(axis=0) / sigma**2)
-            means[method].append(error.mean(axis=0) / sigma)
-            example.setdefault(method, result)
-    stack = {method: np.array(rows) for method, rows in found.items()}
-    return Ratios(
-        example["rls"].description.equations, stack, example, {m: np.array(rows) for m, rows in means.items()}
-    )
+        for way, (method, given) in ways.items():
+            with np.errstate(all="ignore"):  # as printed, with too large a correction, it diverges
+                result = estimate(known, trial.recording, method, **given)
+            after = [e for e in result.estimates if e.time_ns > 0]
+            error = np.array([e.residual for e in after])
+            found[way].append(error.var(axis=0) / sigma**2)
+            means[way].append(error.mean(axis=0) / sigma)
+            inputs = np.array([np.stack([e.crush, e.rate], axis=1).ravel() for e in after])
+            cross[way].append(np.corrcoef(error, inputs, rowvar=False)[: error.shape[1], error.shape[1] :])
+            example.setdefault(way, result)
+    description = example["rls"].description
+    names = tuple(f"{element}.{kind}" for element in description.elements for kind in ("crush", "rate"))
+    arrays = [{way: np.array(rows) for way, rows in by.items()} for by in (found, means, cross)]
+    return Ratios(description.equations, arrays[0], example, arrays[1], names, arrays[2])
 
 
 def noise_orders(which: str, seeds: int, orders: tuple = ((0, 0), (1, 2)), noise=cases.vibrating) -> NoiseOrders:
@@ -156,20 +172,26 @@ def noise_orders(which: str, seeds: int, orders: tuple = ((0, 0), (1, 2)), noise
     truth, trials = noise(cases.chapter_4(which), seeds)
     structure = load_model(FOLDER / "chapter_4.yaml")
     k_true = truth.elements["car_barrier"].secant
-    rows: dict[str, dict] = {name: {order: [] for order in orders} for name in ("q", "inside", "white", "rms")}
+    assumed = -truth.elements["car_barrier"].force  # M = 1
+    rows: dict[str, dict] = {
+        name: {order: [] for order in orders} for name in ("q", "inside", "uncorrelated", "rms", "fit", "crossed")
+    }
     apart, within, example = [], [], {}
     for trial in trials:
         k, sigma = {}, {}
         for p, q in orders:
             result = in_passes(structure, trial.recording, p, q, **GAUSS_NEWTON)
+            late = [e for e in result.estimates if e.time_ns * 1e-9 > SETTLED]
             judged = validate(structure, result.description, result.estimates, what="innovation", start=0.01).equations[
                 0
             ]
-            late = [e for e in result.estimates if e.time_ns * 1e-9 > SETTLED]
             k[p, q], sigma[p, q] = np.array([e.parameters[0] for e in late]), np.array([e.std[0] for e in late])
             rows["q"][p, q].append(judged.q)
             rows["inside"][p, q].append(judged.auto.inside(0.95))
-            rows["white"][p, q].append(judged.q <= white_limit(judged.degrees, p, q))
+            rows["uncorrelated"][p, q].append(judged.q <= uncorrelated_limit(judged.degrees, p, q))
+            lumped = np.array([-one.force[0] for one in result.estimates])
+            rows["fit"][p, q].append(np.sqrt(np.mean((lumped - assumed)[-len(late) :] ** 2)))
+            rows["crossed"][p, q].append([cross.inside(0.99) for cross in judged.cross.values()])
             rows["rms"][p, q].append(np.sqrt(np.mean((k[p, q] - k_true[-len(late) :]) ** 2)))
             example.setdefault((p, q), (result, judged))
         first, second = orders[0], orders[1]
@@ -178,13 +200,13 @@ def noise_orders(which: str, seeds: int, orders: tuple = ((0, 0), (1, 2)), noise
         within.append(np.mean(distance < 2.0))
     arrays = {name: {order: np.array(v) for order, v in by.items()} for name, by in rows.items()}
     return NoiseOrders(
-        which, arrays["q"], judged.degrees, arrays["inside"], arrays["white"], arrays["rms"],
-        np.array(apart), np.array(within), example, k_true,
+        which, arrays["q"], judged.degrees, arrays["inside"], arrays["uncorrelated"], arrays["rms"], arrays["fit"],
+        arrays["crossed"], np.array(apart), np.array(within), example, k_true, assumed,
     )  # fmt: skip
 
 
-def white_limit(lags: int, p: int, q: int) -> float:
-    """95 % limit of Q of a residual whose p + q coefficients were fitted to the same record (Box and Pierce)."""
+def uncorrelated_limit(lags: int, p: int, q: int) -> float:
+    """95 % limit of Q of an innovation whose p + q coefficients were fitted to the same record (Box and Pierce)."""
     return chi_square_quantile(0.95, lags - p - q)
 
 

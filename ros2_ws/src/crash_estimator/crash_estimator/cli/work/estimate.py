@@ -13,7 +13,7 @@ from ...core.errors import EquationError, equation_errors
 from ...core.estimate import Description, ElementState, Estimate, ParameterStatus
 from ...core.fold import run
 from ...core.methods import AnyEstimator, make_estimator
-from ...core.passes import repeats, settle
+from ...core.passes import most_passes, repeats, settle
 from ...model_file import load_model
 from ...tables import besides_table, error_table, known_effects_table, never_touches, parameter_table
 from ..common import check_written, effects_of, parse_settings, read_crash, write_json
@@ -30,7 +30,8 @@ def estimate(arguments: argparse.Namespace) -> None:
         return make_estimator(structure, recording.test, arguments.method, effects=effects, **settings, **start)
 
     estimator = make()
-    passes = settle(lambda start: make(start=start), recording, arguments.passes) if repeats(estimator) else None
+    most = most_passes(arguments.passes, settings.get("preset", "") or structure.preset)
+    passes = settle(lambda start: make(start=start), recording, most) if repeats(estimator) else None
     estimates = passes.estimates if passes else run(estimator, recording.samples())
     description, errors = estimator.description, equation_errors(estimator.description, estimates)
     if arguments.json:  # files before words: `| head` ends this at a line that nobody reads

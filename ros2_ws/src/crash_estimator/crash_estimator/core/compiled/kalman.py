@@ -19,7 +19,7 @@ from ..kinematics import FEWEST, RECORD
 from ..regression import QUIETEST
 from ..regressor_errors import SMALLEST_SHARE
 from .factors import add_square, observe, product_of, seen_through, widen
-from .regressor_errors import pass_on
+from .regressor_errors import pass_one
 
 
 @njit(cache=True)
@@ -104,8 +104,7 @@ def kalman_step(
     )
     for i in range(q):
         if target[i] == target[i]:
-            one = slice(i, i + 1)
-            pass_on(s, gain[:, one], gradient[one], by_errors[:, one], errors)
+            pass_one(s.beside, s.beside_shared, gain[:, i], gradient[i], by_errors[:, i], errors, unit)
     product_of(s.factors, s.covariance)
     if method.noise_memory > 0.0:
         share = dt / (dt + method.noise_memory)

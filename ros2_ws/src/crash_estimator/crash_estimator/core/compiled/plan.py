@@ -6,7 +6,7 @@ import numpy as np
 
 from ..contact import Contact
 from ..estimators.kalman import Kalman
-from ..estimators.rls import NOISE_FLOOR, Rls
+from ..estimators.rls import Rls
 from ..estimators.update import Theta
 from ..kinematics import Kinematics
 from ..regression import Regressor
@@ -123,7 +123,7 @@ def make_method_plan(method: Kalman | Rls) -> MethodPlan:
         step_limit=float(method.step_limit),
         error_limit=float(method.error_limit),
         rewinds=int(method.rewinds),
-        noise_floor=NOISE_FLOOR,
+        noise_floor=float(method.noise_floor),
     )
 
 

@@ -56,11 +56,58 @@ def move_on(s, time):
 
 
 @njit(cache=True)
-def pass_on(s, gain, gradient, by_errors, n):
+def pass_one(whole, shared, gain, psi, h, n, c):
+    """`pass_on` for one equation: gain (w,), psi (w,), h (3, b); c (w,) is scratch.
+
+    S + g c' + c g' + v g g' = S + g d' + d g' with d = c + v g / 2. A body without errors has none to share.
+    """
+    w, v = len(gain), 0.0
+    c[:] = 0.0
+    for b in range(h.shape[1]):
+        h0, h1, h2 = h[0, b], h[1, b], h[2, b]
+        if h0 == 0.0 and h1 == 0.0 and h2 == 0.0:
+            continue
+        v += h0 * (h0 * n[b, 0] + 2.0 * (h1 * n[b, 1] + h2 * n[b, 2]))
+        v += h1 * (h1 * n[b, 3] + 2.0 * h2 * n[b, 4]) + h2 * h2 * n[b, 5]
+        for j in range(w):
+            c[j] += h0 * shared[0, b, j] + h1 * shared[1, b, j] + h2 * shared[2, b, j]
+    for j in range(w):
+        v -= 2.0 * psi[j] * c[j]
+    for k in range(w):
+        if psi[k] != 0.0:
+            for j in range(w):
+                v += psi[k] * psi[j] * whole[k, j]
+    for k in range(w):
+        if psi[k] != 0.0:
+            for j in range(w):
+                c[j] -= psi[k] * whole[k, j]
+    for j in range(w):
+        c[j] += 0.5 * v * gain[j]
+    for j in range(w):
+        for k in range(w):
+            whole[j, k] += gain[j] * c[k] + c[j] * gain[k]
+    for b in range(h.shape[1]):
+        if n[b, 0] == 0.0 and n[b, 3] == 0.0 and n[b, 6] == 0.0:
+            continue
+        h0, h1, h2 = h[0, b], h[1, b], h[2, b]
+        z = h0 * n[b, 0] + h1 * n[b, 1] + h2 * n[b, 2]
+        u = h0 * (n[b, 1] + n[b, 6]) + h1 * n[b, 3] + h2 * n[b, 4]
+        d = h0 * n[b, 2] + h1 * n[b, 4] + h2 * n[b, 5]
+        for j in range(w):
+            z -= psi[j] * shared[0, b, j]
+            u -= psi[j] * shared[1, b, j]
+            d -= psi[j] * shared[2, b, j]
+        for j in range(w):
+            shared[0, b, j] += gain[j] * z
+            shared[1, b, j] += gain[j] * u
+            shared[2, b, j] += gain[j] * d
+
+
+@njit(cache=True)
+def pass_on(whole, shared, gain, gradient, by_errors, n):
     """S and C, in place, after theta += gain (y - gradient theta); gain (w, q), gradient (q, w), n of `known_of`."""
     w, q = gain.shape
     bodies = by_errors.shape[2]
-    whole, shared = s.beside, s.beside_shared
     c, v, pull = np.zeros((w, q)), np.zeros((q, q)), np.zeros((3, bodies, q))
     for i in range(q):
         for b in range(bodies):

@@ -102,7 +102,7 @@ def correct(
     for t in range(len(s.window_dt)):
         before[:, :] = s.window_influence[t]
         multiply(lessen, before, s.window_influence[t])
-    pass_on(s, gain, gradient, by_errors, errors)
+    pass_on(s.beside, s.beside_shared, gain, gradient, by_errors, errors)
 
 
 @njit(cache=True)

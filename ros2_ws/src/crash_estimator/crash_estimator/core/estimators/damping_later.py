@@ -40,6 +40,10 @@ class DampingLater:
     def settings(self) -> Theta:
         return self.method.settings
 
+    @property
+    def regressor_errors(self) -> bool:
+        return bool(self.method.regressor_errors)
+
     def extra_names(self, equations: tuple[str, ...]) -> dict[str, str]:
         names = getattr(self.method, "extra_names", None)
         return names(equations) if names else {}

@@ -13,7 +13,10 @@ averaged out. With y = psi theta + e for these means, every interval counts alik
     S = lambda S + psi' psi,   theta += S^-1 psi' (y - psi theta),   sigma^2 = mean e^2,   covariance = sigma^2 S^-1
 
 RLS weighs by its running error covariance instead, here mostly that of the quiet first milliseconds. The masses
-are constant (lambda = 1) unless told otherwise.
+are constant (lambda = 1) unless told otherwise. `THESIS` is the thesis's "recursive least squares method", 5.3 on every
+sample, with `weighted`:
+
+    Lambda += gamma (e^2 - Lambda),    S = lambda S + psi' psi / Lambda,    theta += S^-1 psi' e / Lambda
 """
 
 from dataclasses import dataclass, replace
@@ -33,6 +36,9 @@ from .window import Window, mean_of, widened
 LEAST = 0.1
 """m/s^2: the model's masses count as one interval at this acceleration, so that S can be inverted from the first."""
 
+THESIS = {"interval": 0.0, "weighted": True}
+"""Settings of 5.3 as printed, on 4.3a or 4.3b."""
+
 
 class MassState(NamedTuple):
     kinematics: KinematicState
@@ -41,6 +47,8 @@ class MassState(NamedTuple):
     information: np.ndarray  # (p, p) S, (m/s^2)^2
     squares: float  # sum of e^2 with forgetting, N^2
     count: float  # intervals with forgetting
+    error_variance: float  # Lambda, N^2; 1 where every interval counts alike
+    gamma: float
 
 
 class Balance(NamedTuple):
@@ -57,6 +65,7 @@ class MassSettings:
     settings: Theta
     interval: float = 0.005  # s: of impulse and momentum; 0: every sample's forces
     forgetting: float = 1.0  # lambda, per interval
+    weighted: bool = False  # an interval counts by the running error variance, as 5.3 prints it; else all alike
 
 
 class EffectiveMass:
@@ -108,7 +117,9 @@ class EffectiveMass:
             )
 
     def init(self) -> MassState:
-        return MassState(self.kinematics.init(), None, self.start, np.zeros((len(self.start),) * 2), 0.0, 0.0)
+        start = (LEAST * self.total) ** 2 if self.settings.weighted else 1.0
+        empty = np.zeros((len(self.start),) * 2)
+        return MassState(self.kinematics.init(), None, self.start, empty, 0.0, 0.0, start, 1.0)
 
     def step(self, state: MassState, sample: Sample) -> tuple[MassState, Estimate]:
         """Fold one sample in; `state` is left as it was."""
@@ -126,21 +137,25 @@ class EffectiveMass:
     def _updated(self, state: MassState, mean: Regression) -> MassState:
         """One step of the recursion."""
         forgetting, psi = self.settings.forgetting, mean.gradient
-        information = forgetting * (state.information if state.count else LEAST**2 * np.eye(len(self.start)))
-        information = information + psi.T @ psi
+        before = state.information if state.count else LEAST**2 / state.error_variance * np.eye(len(self.start))
         innovation = mean.measured - psi @ state.theta
-        theta = state.theta + np.linalg.solve(information, psi.T @ innovation)
+        gamma, scatter = 1.0 / (forgetting / state.gamma + 1.0), state.error_variance
+        if self.settings.weighted:
+            scatter += gamma * (float(innovation @ innovation) - scatter)
+        information = forgetting * before + psi.T @ psi / scatter
+        theta = state.theta + np.linalg.solve(information, psi.T @ innovation) / scatter
         squares = forgetting * state.squares + float(innovation @ (mean.measured - psi @ theta))
         return state._replace(
-            theta=theta, information=information, squares=squares, count=forgetting * state.count + 1.0
-        )
+            theta=theta, information=information, squares=squares, count=forgetting * state.count + 1.0,
+            error_variance=scatter, gamma=gamma,
+        )  # fmt: skip
 
     def _balance(self, state: MassState) -> Balance:
         p = len(self.start)
         if state.count <= p:
             return Balance(np.diag(self.start**2), 0.0)
         variance = state.squares / (state.count - p)
-        covariance = variance * np.linalg.inv(state.information)
+        covariance = (1.0 if self.settings.weighted else variance) * np.linalg.inv(state.information)
         return Balance(0.5 * (covariance + covariance.T), variance)
 
     def _regression(self, motion: Motion) -> Regression:

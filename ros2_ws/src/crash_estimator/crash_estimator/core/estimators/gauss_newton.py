@@ -12,6 +12,8 @@ past e are those of the current theta, the past eps those after their update. Th
 
 theta, d and a go through the recursion of RLS together, with Psi in place of psi; with p = q = 0 it is RLS. The
 roots of D and A are kept within `LARGEST_ROOT`: a stationary error, and a predictor that forgets.
+
+`THESIS` is 4.10 as printed: d and a are estimated from the first sample, are forgotten as theta is, and may be any.
 """
 
 from dataclasses import dataclass
@@ -23,7 +25,8 @@ from ..estimate import Event
 from ..regression import Regression
 from ..regressor_errors import MotionErrors
 from ..structure import ModelError
-from .rls import Rls, RlsState
+from .rls import NOISE_FLOOR, Rls, RlsState
+from .rls import THESIS as THESIS_RLS
 from .update import Theta, Update
 
 LARGEST_ROOT = 0.98
@@ -39,6 +42,9 @@ than white noise of its variance: samples count with a share `TRUST` of their in
 
 LONGEST = 100
 """Orders above this are a mistake in the settings."""
+
+THESIS = THESIS_RLS | {"noise_memory": 0.0, "known_to": np.inf, "largest_root": np.inf}
+"""Settings of 4.10 as printed."""
 
 
 class Past(NamedTuple):
@@ -76,8 +82,13 @@ class GaussNewton:
     q: int | tuple[int, ...] = 2  # moving-average order
     forgetting: float | None = None  # as in RLS
     memory: float = 0.005  # s, as in RLS
-    noise_memory: float = 0.1  # s: of d and a, which are those of the whole record
+    noise_memory: float = 0.1  # s: of d and a, which are those of the whole record; 0: forgotten as theta is
     known_to: float = 0.03  # d and a wait until theta adds less than this share of the noise variance; inf: they do not
+    largest_root: float = LARGEST_ROOT  # of D and A, in modulus; inf: any
+    noise_floor: float = NOISE_FLOOR  # as in RLS
+    forget_excited: bool = True  # as in RLS
+    constrained: bool = True  # as in RLS
+    regressor_errors: bool = True  # as in RLS
     start: tuple[NoiseModel, ...] = ()  # one for each equation, of an earlier pass or an alike test; (): white
 
     def __post_init__(self):
@@ -85,18 +96,15 @@ class GaussNewton:
             orders = getattr(self, name)
             for order in orders if isinstance(orders, tuple) else (orders,):
                 if isinstance(order, bool) or not isinstance(order, int) or not 0 <= order <= LONGEST:
-                    raise ModelError(
-                        f"order {name} of gauss_newton must be a whole number from 0 to {LONGEST}, got {order!r}"
-                    )
+                    said = f"order {name} of gauss_newton must be a whole number from 0 to {LONGEST}, got {order!r}"
+                    raise ModelError(said)
         if not isinstance(self.start, tuple):
-            raise ModelError(
-                f"start of gauss_newton is a tuple of noise models, one for each equation, got {self.start!r}"
-            )
+            raise ModelError(f"start of gauss_newton is a tuple of noise models, one an equation, got {self.start!r}")
 
     def orders(self, equations: int) -> list[tuple[int, int]]:
         """(p, q) of each equation."""
         p, q = ((o,) * equations if isinstance(o, int) else o for o in (self.p, self.q))
-        if len(p) != equations or len(q) != equations:
+        if not len(p) == len(q) == equations:
             raise ModelError(f"gauss_newton needs one order for each of {equations} equations, got p {p} and q {q}")
         return list(zip(p, q))
 
@@ -111,7 +119,7 @@ class GaussNewton:
         }
 
     def init(self, equations: int) -> GaussNewtonState:
-        without = [p + q == 0 for p, q in self.orders(equations)]
+        without = [p + q == 0 or np.isinf(self.known_to) for p, q in self.orders(equations)]
         rls = self._rls(equations).init(equations)
         if not self.start:
             return GaussNewtonState(rls, (), np.array(without))
@@ -199,7 +207,7 @@ class GaussNewton:
     def _remembered(self, state: RlsState, dt: float) -> RlsState:
         """Information on d and a so much larger that the forgetting of RLS leaves what `noise_memory` leaves."""
         count, p = len(state.theta), len(self.settings.initial)
-        if count == p:
+        if count == p or not self.noise_memory:
             return state
         keep = np.ones(count)
         keep[p:] = np.sqrt(float(np.exp(-dt / self.noise_memory)) / self._forgetting(dt))
@@ -258,7 +266,7 @@ class GaussNewton:
     def _stable(self, theta: np.ndarray, equations: int) -> np.ndarray:
         theta = theta.copy()
         for d, a in self._slices(equations):
-            theta[d], theta[a] = stable(theta[d]), stable(theta[a])
+            theta[d], theta[a] = stable(theta[d], self.largest_root), stable(theta[a], self.largest_root)
         return theta
 
     def _rls(self, equations: int) -> Rls:
@@ -272,17 +280,20 @@ class GaussNewton:
             np.concatenate([s.upper, np.inf * more]),
             np.concatenate([s.scale, more]),
         )
-        return Rls(wide, forgetting=self.forgetting, memory=self.memory)
+        return Rls(
+            wide, self.forgetting, self.memory,
+            noise_floor=self.noise_floor, forget_excited=self.forget_excited, constrained=self.constrained,
+        )  # fmt: skip
 
 
-def stable(coefficients: np.ndarray) -> np.ndarray:
-    """Coefficients c of 1 + c_1 B + ... with every root r of z^n + c_1 z^(n-1) + ... at most LARGEST_ROOT in modulus.
+def stable(coefficients: np.ndarray, limit: float = LARGEST_ROOT) -> np.ndarray:
+    """Coefficients c of 1 + c_1 B + ... with every root r of z^n + c_1 z^(n-1) + ... at most `limit` in modulus.
 
     All roots are drawn in by the same factor f, which multiplies c_i by f^i and keeps the shape of the spectrum.
     """
-    if not len(coefficients) or np.abs(coefficients).sum() < LARGEST_ROOT ** len(coefficients):
+    if not len(coefficients) or np.isinf(limit) or np.abs(coefficients).sum() < limit ** len(coefficients):
         return coefficients  # by Rouche's theorem all roots are within
     largest = np.abs(np.roots(np.concatenate([[1.0], coefficients]))).max()
-    if largest <= LARGEST_ROOT:
+    if largest <= limit:
         return coefficients
-    return coefficients * (LARGEST_ROOT / largest) ** np.arange(1, len(coefficients) + 1)
+    return coefficients * (limit / largest) ** np.arange(1, len(coefficients) + 1)

@@ -14,7 +14,7 @@ import numpy as np
 from ..estimate import Event
 from ..regression import Regression
 from ..structure import ModelError
-from .gauss_newton import GaussNewton, GaussNewtonState
+from .gauss_newton import THESIS, GaussNewton, GaussNewtonState
 from .update import Theta, Update
 
 SETTLING = 20
@@ -37,14 +37,21 @@ class OrderBank:
     aic: bool = False  # Akaike's criterion instead of Schwarz's
     forgetting: float | None = None  # as in RLS
     memory: float = 0.005  # s, as in RLS
+    printed: bool = False  # the members follow the thesis's 4.10 as printed; it has no such bank
     members: tuple[GaussNewton, ...] = field(init=False)
 
     def __post_init__(self):
         if not isinstance(self.largest, int) or not 0 <= self.largest <= 10:
             raise ModelError(f"largest order of gauss_newton_orders must be from 0 to 10, got {self.largest!r}")
         orders = [(p, q) for p in range(self.largest + 1) for q in range(self.largest + 1)]
-        members = tuple(GaussNewton(self.settings, p, q, self.forgetting, self.memory) for p, q in orders)
+        more: dict = THESIS if self.printed else {}
+        members = tuple(GaussNewton(self.settings, p, q, self.forgetting, self.memory, **more) for p, q in orders)
         object.__setattr__(self, "members", members)
+
+    @property
+    def regressor_errors(self) -> bool:
+        """As its members have it."""
+        return self.members[0].regressor_errors
 
     def extra_names(self, equations: tuple[str, ...]) -> dict[str, str]:
         """Name -> unit of `Update.extra`: the orders chosen."""

@@ -12,6 +12,12 @@ are used again with the correction multiplied by cr, each step clipped to theta_
 on. This is repeated until the mean is within its limit, or `rewinds` times. Figure 5.1 has no guard against a
 correction that overshoots; here a pass that leaves a larger mean than it found is taken back and ends the rewinding.
 
+What the thesis does not print is a setting: `THESIS` and `THESIS_MRLS` are the recursions as printed. There all of R is
+forgotten by every sample, Lambda has no floor, no bound holds theta, the error limit is that of the noise known before,
+theta_lmt holds for every step, samples are used again until the mean is within its limit or `rewinds` times, also where
+that overshoots, and the integrated motion is taken as true. Figure 5.1 is not in the thesis's text: the index is taken
+to go back after the step of sample t.
+
 Covariance of theta: each step is linear, theta += G (y - Psi theta) with whatever gain G was used, so that the errors v
 of the measurements, of variance r, pass through it as
 
@@ -35,6 +41,12 @@ from .update import Theta, Update, within_bounds
 
 NOISE_FLOOR = 0.1
 """Share of the known noise variance below which Lambda must not fall: it is the mean of few E E': nearly singular."""
+
+THESIS = {"noise_floor": 0.0, "forget_excited": False, "constrained": False, "regressor_errors": False}
+"""Settings of 5.3 as printed."""
+THESIS_MRLS = THESIS | {"learn_limit": False, "limit_every_step": True, "take_back": False}
+"""Settings of 5.5.1 as printed, but for `rewinds`: where the mean does not come within its limit, as with a `cr` that
+overshoots, the printed rewinding never ends."""
 
 
 class RlsState(NamedTuple):
@@ -71,6 +83,19 @@ class Rls:
     step_limit: float = 0.05  # theta_lmt as a share of each parameter's scale
     error_limit: float = 2.58  # times the error's standard deviation over sqrt(m): 99 %
     rewinds: int = 10
+    noise_floor: float = NOISE_FLOOR  # share of the known noise variance that is added to Lambda
+    forget_excited: bool = True  # a sample forgets only what it excites; else all of R
+    constrained: bool = True  # keep the parameters' bounds
+    learn_limit: bool = True  # the error's standard deviation is learnt; else that of the noise known before
+    limit_every_step: bool = False  # theta_lmt also on steps that are not repeated
+    take_back: bool = True  # a pass that leaves a larger mean than it found is taken back
+    regressor_errors: bool = True  # count errors of the integrated motion and the lag; hold what they hide
+
+    @property
+    def compilable(self) -> bool:
+        """Whether the compiled form has these settings: it has the default of each addition to the thesis."""
+        learns = self.learn_limit and self.take_back and not self.limit_every_step
+        return self.forget_excited and self.constrained and self.regressor_errors and learns
 
     def init(self, equations: int) -> RlsState:
         std = np.where(self.settings.std > 0, self.settings.std, 1.0)
@@ -98,6 +123,8 @@ class Rls:
         size = np.maximum(np.abs(state.theta), SMALLEST_SHARE * self.settings.scale)
         bodies = 0 if regression.errors is None else len(regression.errors.zero)
         beside = none_yet(len(state.theta), bodies) if state.beside is None else state.beside
+        if regression.errors is None:
+            return state._replace(beside=beside)
         return state._replace(beside=beside.walked(regression.walk * size**2))
 
     def _started(self, state: RlsState, regression: Regression) -> RlsState:
@@ -121,11 +148,11 @@ class Rls:
         )
         valid = ~np.isnan(error)
         weight = np.zeros_like(error_covariance)
-        floor = NOISE_FLOOR * np.diag(np.nan_to_num(regression.noise, nan=0.0))
+        floor = self.noise_floor * np.diag(np.nan_to_num(regression.noise, nan=0.0))
         weight[np.ix_(valid, valid)] = np.linalg.inv((error_covariance + floor)[np.ix_(valid, valid)])
         weight *= np.sqrt(np.multiply.outer(trust * np.ones(len(weight)), trust * np.ones(len(weight))))
-        excited = regression.active & (regression.gradient[valid] != 0.0).any(axis=0)
-        fade = np.where(excited, np.sqrt(forgetting), 1.0)
+        excited = regression.active & ((regression.gradient[valid] != 0.0).any(axis=0) | (not self.forget_excited))
+        fade = np.where(excited | (not self.forget_excited), np.sqrt(forgetting), 1.0)
         of_active = np.where(excited, regression.gradient, 0.0)
         gained = of_active.T @ weight @ of_active
         information = fade[:, None] * state.information * fade + gained
@@ -139,7 +166,7 @@ class Rls:
                 information[np.ix_(index, index)], np.column_stack([pull @ residual, pull])
             )
             step, gain[:], gain[index] = both[:, 0], 0.0, both[:, 1:]
-            if multiplier != 1.0:
+            if multiplier != 1.0 or self.limit_every_step:
                 limit = self.step_limit * self.settings.scale[index]
                 gain[index] *= np.minimum(1.0, limit / np.maximum(np.abs(step), 1e-300))[:, None]
                 step = np.clip(step, -limit, limit)
@@ -147,7 +174,9 @@ class Rls:
             updated[index] += step
             return updated
 
-        theta, clamped = within_bounds(solve, state.theta, excited, self.settings)
+        none = np.full(len(state.theta), np.inf)
+        bounds = self.settings if self.constrained else self.settings._replace(lower=-none, upper=none)
+        theta, clamped = within_bounds(solve, state.theta, excited, bounds)
         lessen = np.eye(len(theta)) - gain @ regression.gradient
         state = state._replace(
             theta=theta,
@@ -182,7 +211,8 @@ class Rls:
     def _rewind(self, state: RlsState, clamped: np.ndarray) -> tuple[RlsState, np.ndarray, tuple[Event, ...]]:
         if not self.m or len(state.window) < self.m:
             return state, clamped, ()
-        limit = self.error_limit * np.sqrt(state.residual_variance / self.m)
+        known = np.nan_to_num(state.window[-1].noise, nan=1.0)
+        limit = self.error_limit * np.sqrt((state.residual_variance if self.learn_limit else known) / self.m)
         passes, excess = 0, self._excess(state.errors, limit)
         while passes < self.rewinds and excess > 1.0:
             again, errors, held = state, [], clamped
@@ -193,7 +223,7 @@ class Rls:
                 again, held = again._replace(influence=tuple(influence)), step.clamped
                 errors.append(step.error)
             now = self._excess(tuple(errors), limit)
-            if now >= excess:  # the large correction has overshot: it is taken back
+            if self.take_back and now >= excess:  # the large correction has overshot: it is taken back
                 break
             chosen = self._chosen_variance(state)
             variances = tuple(np.maximum(variance, chosen) for variance in state.variances)

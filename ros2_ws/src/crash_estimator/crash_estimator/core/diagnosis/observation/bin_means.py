@@ -38,6 +38,7 @@ def in_bins(record: ObservedRecord) -> ObservedRecord:
         measured=mean,
         on_grid=on_grid(grid, np.arange(1, bins + 1), mean),
         noise=record.noise / np.sqrt(per_bin),
+        weight=None,
         signals={name: _in_bins(signal, used, per_bin, grid) for name, signal in record.signals.items()},
         bin=bin_,
         valid=np.concatenate([np.zeros((1, mean.shape[1])), np.sqrt(count / per_bin)]),
@@ -49,4 +50,5 @@ def in_bins(record: ObservedRecord) -> ObservedRecord:
 def _in_bins(signal: Signal, used: int, per_bin: int, grid: np.ndarray) -> Signal:
     means = signal.values[-used:].reshape(-1, per_bin).mean(axis=1)
     values = np.concatenate([means[:1], means])
-    return signal._replace(time=grid, values=values, on_grid=values, noise=signal.noise / np.sqrt(per_bin))
+    spectrum = signal.spectrum._replace(std=signal.noise / np.sqrt(per_bin))
+    return signal._replace(time=grid, values=values, on_grid=values, spectrum=spectrum)

@@ -33,7 +33,7 @@ def with_inflated_noise(
     """The records with the noise that residuals, (n, q) SI each, show; never less than the sensors' own."""
     coarse, powers, levels = [], [], []
     for record, residual in zip(records, residuals):
-        bin_, valid, bins = bins_of(record.time, record.at, record.measured, BIN)
+        bin_, valid, bins = bins_of(record.time, record.at, record.measured, BIN, record.seen_early)
         weight = valid[record.at] / record.noise
         z = np.zeros((bins, residual.shape[1]))
         np.add.at(z, bin_[record.at], np.nan_to_num(residual) * weight)
@@ -42,7 +42,7 @@ def with_inflated_noise(
         bands = [(frequency >= a) & (frequency < b) for a, b in zip(EDGES, EDGES[1:])]
         powers.append(spectrum.T @ spectrum / bins)
         levels.append([float((spectrum[inside] ** 2).mean()) for inside in bands if inside.any()])
-        coarse.append(record._replace(bin=bin_, valid=valid, bins=bins))
+        coarse.append(record._replace(bin=bin_, valid=valid, bins=bins, weight=None))
     # the strongest band says how many samples are independent: as many as of white noise as strong as it
     power = np.mean(powers, axis=0)
     peak = max(float(np.mean(level)) for level in zip(*levels)) / max(float(np.trace(power)) / len(power), 1e-30)

@@ -14,10 +14,12 @@ from crash_replay.recording import SI_UNIT, Recording, Test
 
 from ...derived_motion import between_samples, smoothed
 from ...kinematics import Kinematics
+from ...noise_spectrum import NoiseSpectrum
 from ...sensor_noise import sensor_noise
 from ...structure import ModelError, Structure
 from .pace import longest_step
 from .tracked_motion import tracked_acceleration
+from .whitening import filtered, weights
 
 BIN = 4e-4
 """s: length of the bins that outputs are averaged over; they keep what is below 1250 Hz, and a crash model says nothing
@@ -36,9 +38,13 @@ class Signal(NamedTuple):
     time: np.ndarray  # s since the impact
     values: np.ndarray
     on_grid: np.ndarray  # (g,) values at the instants of the record
-    noise: float  # standard deviation of one sample
-    noise_samples: float  # that it was found from
+    spectrum: NoiseSpectrum
     offset_std: float  # of the zero offset that was removed
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of a sample of white noise as strong as this one is where bodies move."""
+        return self.spectrum.std
 
 
 class Output(NamedTuple):
@@ -74,8 +80,8 @@ class ObservedRecord(NamedTuple):
     period: float  # s, median between samples
     measured: np.ndarray  # (n, q) zero offset removed, NaN where not valid
     on_grid: np.ndarray  # (g, q) the same at all instants, 0 where there is no valid sample
-    noise: np.ndarray  # (q,) standard deviation of one sample
-    noise_samples: np.ndarray  # (q,) samples that it was found from; inf where the model states it
+    noise: np.ndarray  # (q,) standard deviation of a sample of white noise as strong as this one is where bodies move
+    spectra: tuple[NoiseSpectrum, ...]  # (q,) of a sample; known from inf samples where the model states it
     offset_std: np.ndarray  # (q,)
     signals: dict[str, Signal]  # every acceleration channel, and the measured crush and rate channels
     initial_displacement: np.ndarray  # (b,) m
@@ -85,11 +91,34 @@ class ObservedRecord(NamedTuple):
     bins: int
     cosines: np.ndarray  # (g, 1 + DRIVEN_MODES), the mean first
     whitener: np.ndarray | None = None  # (q, q) of outputs in units of their noise; None: independent, as the sensors'
+    below: float = np.inf  # Hz: the band that is compared
+    weight: np.ndarray | None = None  # (bins, q) of the outputs' frequencies, `whitening.weights`; None: all alike
 
     @property
     def noise_is_inflated(self) -> bool:
         """Noise stands for what a model leaves, not for the sensors' alone."""
         return self.whitener is not None
+
+    def whitened(self, binned: np.ndarray) -> np.ndarray:
+        """Outputs in bins (bins, q, ...), in units of noise, as if that were white, in the band that is compared."""
+        binned = binned if self.weight is None else filtered(binned, self.weight)
+        return self.whitener @ binned if self.noise_is_inflated else binned
+
+    def in_band(self, below: float) -> "ObservedRecord":
+        """Compared below so many Hz only."""
+        weight = weights(self.spectra, below, self.bins, self.period, self.per_bin)
+        return self._replace(below=below, weight=weight)
+
+    @property
+    def compared(self) -> np.ndarray:
+        """(q,) share of the frequencies."""
+        return np.ones(len(self.noise)) if self.weight is None else (self.weight > 0.0).mean(axis=0)
+
+    @property
+    def seen_early(self) -> float:
+        """s by which a filter that runs backward, too, shows a motion before it begins: half a period of the highest
+        frequency that it passes."""
+        return _seen_early(self.spectra)
 
     @property
     def kick(self) -> np.ndarray:
@@ -169,9 +198,9 @@ def observe(structure: Structure, recording: Recording) -> ObservedRecord:
             signals[name] = signals[name]._replace(on_grid=tracked_acceleration(time, path, *start[:, k]))
     measured = np.stack([_raw(recording, o.channel, signals[o.channel])[after] for o in outputs], axis=1)
     given = [structure.bodies[o.body].noise for o in outputs]
-    noise = np.array([g or signals[o.channel].noise for g, o in zip(given, outputs)])
-    bin_, valid, bins = bins_of(time, at, measured)
-    return ObservedRecord(
+    spectra = [NoiseSpectrum(g, np.inf) if g else signals[o.channel].spectrum for g, o in zip(given, outputs)]
+    bin_, valid, bins = bins_of(time, at, measured, mixed=_seen_early(spectra))
+    record = ObservedRecord(
         test=recording.test,
         time=time,
         dt=np.diff(time, prepend=time[0]),
@@ -180,8 +209,8 @@ def observe(structure: Structure, recording: Recording) -> ObservedRecord:
         period=float(np.median(np.diff(time[at]))),
         measured=measured,
         on_grid=on_grid(time, at, measured),
-        noise=noise,
-        noise_samples=np.array([np.inf if g else signals[o.channel].noise_samples for g, o in zip(given, outputs)]),
+        noise=np.array([spectrum.std for spectrum in spectra]),
+        spectra=tuple(spectra),
         offset_std=np.array([_offset_std(signals[o.channel], o) for o in outputs]),
         signals=signals,
         initial_displacement=kinematics.initial_displacement,
@@ -191,6 +220,7 @@ def observe(structure: Structure, recording: Recording) -> ObservedRecord:
         bins=bins,
         cosines=cosines_of(time),
     )
+    return record.in_band(np.inf)
 
 
 def cosines_of(time: np.ndarray) -> np.ndarray:
@@ -227,8 +257,13 @@ def _signal(recording: Recording, name: str, grid: np.ndarray) -> Signal:
     offset = float(values[before].mean()) if rests and count else 0.0
     bridged = np.interp(recording.time_ns, recording.time_ns[valid], values[valid]) - offset
     noise = sensor_noise(bridged, recording.time_ns, rests)
+    bridged = noise.unfiltered(bridged)
     values = np.interp(grid, recording.time, bridged)
-    return Signal(recording.time, bridged, values, *noise, noise.std / np.sqrt(count) if count else 0.0)
+    return Signal(recording.time, bridged, values, noise, noise.std / np.sqrt(count) if count else 0.0)
+
+
+def _seen_early(spectra: Sequence[NoiseSpectrum]) -> float:
+    return 0.5 / min((spectrum.passed for spectrum in spectra), default=np.inf)
 
 
 def _offset_std(signal: Signal, output: Output) -> float:
@@ -241,16 +276,21 @@ def _raw(recording: Recording, name: str, signal: Signal) -> np.ndarray:
 
 
 def bins_of(
-    time: np.ndarray, at: np.ndarray, measured: np.ndarray, length: float = BIN
+    time: np.ndarray, at: np.ndarray, measured: np.ndarray, length: float = BIN, mixed: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """`bin`, `valid` and `bins` of an ObservedRecord whose bins are `length` s long."""
+    """`bin`, `valid` and `bins` of an ObservedRecord whose bins are `length` s long.
+
+    mixed: s from the impact on in which a filter shows what was before it as well; they are not compared.
+    """
     period = float(np.median(np.diff(time[at])))
     per_bin = max(1, int(round(length / period)))
     bin_ = np.full(len(time), -1)
     bin_[at] = np.arange(len(at)) // per_bin
     bins = int(bin_.max()) + 1
     ok = np.isfinite(measured).astype(float)
-    ok[time[at] < 1e-9] = 0.0  # at the very impact forces may jump: on which side this sample lies is chance
+    ok[time[at] < max(mixed, 1e-9)] = (
+        0.0  # at the very impact forces may jump: on which side this sample lies is chance
+    )
     count = np.zeros((bins, measured.shape[1]))
     np.add.at(count, bin_[at], ok)
     valid = np.zeros((len(time), measured.shape[1]))

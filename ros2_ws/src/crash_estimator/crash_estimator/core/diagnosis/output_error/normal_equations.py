@@ -86,8 +86,8 @@ def _put(columns, products, matrix, vector):
 
 
 def _filled(record: ObservedRecord) -> np.ndarray:
-    """(q,) bins with a valid sample."""
-    return np.count_nonzero(binned(record, record.valid), axis=0)
+    """(q,) bins with a valid sample, as many as are compared."""
+    return np.count_nonzero(binned(record, record.valid), axis=0) * record.compared
 
 
 def whitened(
@@ -109,7 +109,7 @@ def whitened(
         along += np.where(layout.kind == FREE, observer.acceleration(trajectory), 0.0)
     misfit = record.on_grid - predicted(experiment, theta, along, trajectory)[0]
     out[:, :, 0] = binned(record, weight * misfit) - out[:, :, 0]
-    return record.whitener @ out if record.noise_is_inflated else out
+    return record.whitened(out)
 
 
 def binned(record: ObservedRecord, values: np.ndarray) -> np.ndarray:

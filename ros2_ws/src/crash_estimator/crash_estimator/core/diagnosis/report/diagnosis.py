@@ -104,7 +104,7 @@ def diagnose(
     structure, recordings = with_accelerations(structure, recordings)
     with time_limit(seconds):
         records, zero, unused = _observed(structure, recordings, effects)
-        path = first_believed(select(structure, records, effects), records)
+        path = first_believed(select(structure, records, effects))
         stopped = out_of_time()
     found = _answer(structure, path, drift_of(path.as_recorded), tolerance, zero)
     remarks = [clipped] if clipped else []
@@ -125,7 +125,7 @@ def _observed(
         return [observe(structure, at_its_own_pace(structure, recording)) for recording in recordings]
 
     records, elsewhere = observed(recordings), onsets_elsewhere(recordings)
-    early = tuple(shift for shift in elsewhere if shift.seconds < 0.0)
+    early = tuple(shift for shift in elsewhere if shift.seconds < -records[shift.recording].seen_early)
     if early:
         from_onset = observed(moved_by(early, recordings))
         zero = time_zero_wrong(structure, records, from_onset, early, effects)

@@ -62,10 +62,10 @@ def band_test(residuals, noise_samples, periods) -> BandTest:
     for r, (residual, samples, period) in enumerate(zip(residuals, noise_samples, periods)):
         for q in range(residual.shape[1]):
             z = residual[:, q]
-            power, bands = _bands(z[np.isfinite(z)], period, EDGES)
+            power, bands = power_in_bands(z[np.isfinite(z)], period, EDGES)
             for low, high, inside in bands:
                 ratio = float(power[inside].mean())
-                p = _probability(np.count_nonzero(inside), samples[q], ratio)
+                p = probability_of(np.count_nonzero(inside), samples[q], ratio)
                 found.append((p, Band(r, q, low, min(high, 0.5 / period), ratio)))
     return _worst_of(found)
 
@@ -80,7 +80,7 @@ def band_test_of_fit(records: Sequence[Sequence[Absorbed]], noise_samples) -> Ba
     found = []
     for r, (outputs, samples) in enumerate(zip(records, noise_samples)):
         for q, one in enumerate(outputs):
-            power, bands = _bands(one.residual, one.period, ABSORBING)
+            power, bands = power_in_bands(one.residual, one.period, ABSORBING)
             root = dct(one.root, norm="ortho", axis=0)
             for low, high, inside in bands:
                 covariance = np.eye(np.count_nonzero(inside)) - root[inside] @ root[inside].T
@@ -88,11 +88,11 @@ def band_test_of_fit(records: Sequence[Sequence[Absorbed]], noise_samples) -> Ba
                 if mean < LEAST_LEFT:
                     continue
                 ratio = float(power[inside].sum()) / mean
-                found.append((_probability(mean**2 / square, samples[q], ratio), Band(r, q, low, high, ratio)))
+                found.append((probability_of(mean**2 / square, samples[q], ratio), Band(r, q, low, high, ratio)))
     return _worst_of(found)
 
 
-def _bands(z: np.ndarray, period: float, edges: Sequence[float]):
+def power_in_bands(z: np.ndarray, period: float, edges: Sequence[float]):
     """Power of the cosine transform, and the bands (low, high, coefficients inside) that have any."""
     power = dct(np.clip(z, -CLIP, CLIP), norm="ortho") ** 2
     frequency = np.arange(len(z)) / (2.0 * len(z) * period)
@@ -100,7 +100,8 @@ def _bands(z: np.ndarray, period: float, edges: Sequence[float]):
     return power, [band for band in bands if band[2].any()]
 
 
-def _probability(freedom: float, samples: float, ratio: float) -> float:
+def probability_of(freedom: float, samples: float, ratio: float) -> float:
+    """That noise of so many degrees of freedom is as large, over one that is known from so many samples."""
     return float(fdtrc(freedom, min(float(samples), 1e6), ratio))
 
 

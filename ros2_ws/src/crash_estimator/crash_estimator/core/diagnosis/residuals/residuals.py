@@ -9,6 +9,7 @@ from ..mechanics.linearization import Equations, linearise
 from ..mechanics.link_force import LinkForce
 from ..mechanics.outputs import output_noise, predicted
 from ..observation.record import ObservedRecord
+from ..observation.whitening import filtered, weights
 from ..output_error.gauss_newton import Fit
 from ..output_error.normal_equations import may_diverge, whitened
 from ..output_error.problem import OutputErrorProblem, Point
@@ -24,6 +25,7 @@ class Residuals(NamedTuple):
     predicted: tuple[np.ndarray, ...]  # per record (n, q) SI
     residual: tuple[np.ndarray, ...]  # per record (n, q) SI, measured minus predicted; NaN where not valid
     noise: tuple[np.ndarray, ...]  # per record (q,) SI, standard deviation that noise alone gives a residual
+    in_noise: tuple[np.ndarray, ...]  # per record (n, q) residual in units of the noise, as if that were white
     links: tuple[list[LinkForce], ...]
     band_test: BandTest
     rms: float  # m/s^2
@@ -49,7 +51,8 @@ def rms(layout: Layout, values: Sequence[np.ndarray]) -> float:
 
 def noise_floor(layout: Layout, records: Sequence[ObservedRecord]) -> float:
     """The RMS that the sensors' noise alone leaves, m/s^2."""
-    return rms(layout, [np.where(np.isfinite(r.measured), r.noise, np.nan) for r in records])
+    of_one = [np.array([s.of_one_sample for s in record.spectra]) for record in records]
+    return rms(layout, [np.where(np.isfinite(r.measured), one, np.nan) for r, one in zip(records, of_one, strict=True)])
 
 
 @may_diverge
@@ -64,7 +67,7 @@ def analyse(fitted: Fit, sharply: bool = False) -> Residuals:
     if not sharply or not found.white or problem.noise_is_inflated:
         return found
     absorbed = [_absorbed(fitted, *each) for each in zip(problem.experiments, equations, strict=True)]
-    sharper = band_test_of_fit(absorbed, [record.noise_samples for record in problem.records])
+    sharper = band_test_of_fit(absorbed, _noise_samples(problem.records))
     return found if sharper.white else found._replace(band_test=sharper)
 
 
@@ -96,12 +99,26 @@ def _residuals(problem: OutputErrorProblem, point: Point, equations: Sequence[Eq
         residuals.append(np.where(record.valid[record.at] > 0.0, record.measured - output, np.nan))
     links = tuple(each.links for each in equations)
     noise = tuple(output_noise(experiment, theta).std for experiment in problem.experiments)
-    scaled = [residual / std for residual, std in zip(residuals, noise, strict=True)]
     records = problem.records
-    tested = band_test(scaled, [record.noise_samples for record in records], [record.period for record in records])
-    mean_square = float(np.nanmean(np.concatenate([z.ravel() for z in scaled]) ** 2))
+    scaled = [_white(r, residual / std) for r, residual, std in zip(records, residuals, noise, strict=True)]
+    tested = band_test(scaled, _noise_samples(records), [record.period for record in records])
+    compared = float(np.mean([record.compared.mean() for record in records]))
+    mean_square = float(np.nanmean(np.concatenate([z.ravel() for z in scaled]) ** 2)) / compared
     size = rms(problem.layout, residuals)
-    return Residuals(tuple(outputs), tuple(residuals), noise, links, tested, size, mean_square)
+    return Residuals(tuple(outputs), tuple(residuals), noise, tuple(scaled), links, tested, size, mean_square)
+
+
+def _noise_samples(records: Sequence[ObservedRecord]) -> list[np.ndarray]:
+    """(q,) of each, that its noise was found from."""
+    return [np.array([spectrum.samples for spectrum in record.spectra]) for record in records]
+
+
+def _white(record: ObservedRecord, z: np.ndarray) -> np.ndarray:
+    """Residuals (n, q) in units of the noise, as if that were white, in the band that is compared."""
+    weight = weights(record.spectra, record.below, len(z), record.period)
+    if weight is None or record.noise_is_inflated:
+        return z
+    return np.where(np.isfinite(z), filtered(np.nan_to_num(z), weight), np.nan)
 
 
 @may_diverge

@@ -150,4 +150,4 @@ def _of_sensors(
         column = (equations.sampling.weight[:, n] * shown[:, n])[:, None] * modes
         np.add.at(found[:, n, n], record.bin[record.at], column[record.at])
     found = found.reshape(record.bins, q, -1)
-    return record.whitener @ found if record.noise_is_inflated else found
+    return record.whitened(found)

@@ -19,6 +19,7 @@ from ..parameterization.experiment import experiments_of
 from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
 from ..parameterization.model_terms import additions_of
 from ..residuals.residuals import Residuals, analyse
+from ..residuals.vibration import vibrates_from
 from .acceptance import share_removed
 from .fitted_model import Model, fit_model
 from .forward_selection import forward_selection
@@ -41,6 +42,7 @@ class SelectionPath(NamedTuple):
     final: Model
     present: int  # additions that the structure had
     as_recorded: Fit  # of the final model, in the sensors' noise
+    records: Sequence[ObservedRecord]  # in the band that was compared
 
     def rank(self) -> tuple[bool, float]:
         """Of paths under different assumptions the largest is believed."""
@@ -48,7 +50,19 @@ class SelectionPath(NamedTuple):
 
 
 def select(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
-    """The effects that a structure lacks. Raises ModelError where it names an effect that there is not."""
+    """The effects that a structure lacks, in the band below its vibration. Raises ModelError where it names an effect
+    that there is not."""
+    path = _selected(structure, records, effects)
+    if path.final.white or out_of_time():
+        return path
+    left = analyse(path.as_recorded)
+    vibration = vibrates_from(left, records)
+    if vibration == np.inf or left.mean_square >= THRESHOLDS.real_structure:
+        return path
+    return _selected(structure, [record.in_band(vibration) for record in records], effects)
+
+
+def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
     path = _with_curves_as_fine_as_needed(structure, records, effects)
     pushing = never_pulling(structure)
     if pushing is not structure and not out_of_time() and _may_be_explained_by(pushing, path, records):
@@ -56,7 +70,7 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
     return path
 
 
-def first_believed(path: SelectionPath, records: Sequence[ObservedRecord]) -> SelectionPath:
+def first_believed(path: SelectionPath) -> SelectionPath:
     """Up to as many additions as are believed together, where all of them leave more than noise, or where these leave
     next to nothing: the first ones explain most, and what came after them only goes on from there."""
     most = THRESHOLDS.most_at_once
@@ -65,7 +79,8 @@ def first_believed(path: SelectionPath, records: Sequence[ObservedRecord]) -> Se
     final = path.steps[most].before
     if path.final.white and share_removed(path.steps[0].before.residuals, final.residuals) < THRESHOLDS.all_but_folds:
         return path
-    return path._replace(steps=path.steps[: most + 1], final=final, as_recorded=in_the_sensors_noise(final, records))
+    as_recorded = in_the_sensors_noise(final, path.records)
+    return path._replace(steps=path.steps[: most + 1], final=final, as_recorded=as_recorded)
 
 
 def never_pulling(structure: Structure) -> Structure:
@@ -127,7 +142,7 @@ def _with_curves_as_fine_as_needed(
     steps, reported = up_to_the_least_error(steps, final, len(present))
     if reported is not final:
         final, as_recorded = reported, in_the_sensors_noise(reported, records)
-    return SelectionPath(structure, steps, final, len(present), as_recorded)
+    return SelectionPath(structure, steps, final, len(present), as_recorded, records)
 
 
 def _wants_finer_curves(final: Model, residuals: Residuals, finer: Magnitudes, present: int) -> bool:

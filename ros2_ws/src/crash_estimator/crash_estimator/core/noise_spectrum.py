@@ -1,0 +1,186 @@
+"""The spectrum of a sensor's noise, from its rest before the impact: white, coloured, or cut off by a filter.
+
+Amplifiers colour noise: neighbouring samples are alike, and low frequencies hold more of its power than their share. An
+autoregressive model e(t) = n(t) + sum over k of a_k n(t - k T), with white e of variance s^2, has the power density,
+where white noise of variance s^2 has s^2,
+
+    S(f) = s^2 / |1 + sum over k of a_k exp(-2 pi i f k T)|^2.
+
+The a_k are found by Burg's recursion (Burg 1975), their number by Schwarz's criterion (BIC). Where that falls off as
+steeply as behind a filter of SAE J211-1, passed forward and backward,
+
+    G(f) = 1 / (1 + (f / f0)^4),   f0 = 2.0775 Hz times the channel frequency class,
+
+the noise before it is taken as white, and what the filter has taken of the signal, too, is given back.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.fft import dct, idct
+from scipy.linalg import toeplitz
+from scipy.special import chdtrc
+
+from crash_replay.conditioning import CFC_CLASSES
+
+SLOW = 120.0
+"""Hz: below it lies what a structure's motion is known by (SAE J211: CFC 60 is 3 dB down at 100 Hz), so that it is the
+noise's power there that a fit has to do with."""
+
+SIGNIFICANT = 0.001
+"""Probability that white noise is called coloured."""
+
+MOST = 12
+"""Order: a filter of two poles run forward and backward takes four, a resonance two."""
+
+PER_ORDER = 20
+"""Samples, at least, for each order that is tried."""
+
+TOLD = 10.0
+"""Samples, of white noise, from which the power below SLOW must be known as well, to a factor of two: where it is not,
+what is slow at rest is a body that sways, or one period of a hum, and says nothing of the noise in a crash."""
+
+FINE = 513
+"""Frequencies that a density is looked at."""
+
+STEEP = 1.6
+"""Ratio of the frequencies where the density is 20 and 10 dB down, below which a filter has cut it off: 1.43 of SAE
+J211's, 1.82 of two poles passed once, 3.3 of one."""
+
+CORNER = 2.0775
+"""Hz, f0 for each of a channel frequency class (SAE J211-1, appendix C)."""
+
+TEN_DOWN = 1.21
+"""Times f0: where G^2 is 10 dB down."""
+
+ALIKE = 0.4
+"""Natural logarithm of the ratio to a class's own f0 within which it is that class: classes are a factor of 1.7 apart
+at least, and 30 ms of noise tell f0 to a fifth."""
+
+PASSED = 0.5
+"""Of f0: the band in which a filtered channel is compared, and in which what the filter took, 6 %, is given back."""
+
+
+class NoiseSpectrum(NamedTuple):
+    """Of one channel."""
+
+    std: float  # of a sample of white noise as strong as this one is below SLOW, or before the filter
+    samples: float  # that this variance is known as well as from
+    coefficients: tuple[float, ...] = ()  # a_k of coloured noise; none: white
+    corner: float = np.inf  # f0, Hz, of the filter that has cut it off; inf: none has
+    period: float = 1.0  # s
+
+    @property
+    def white(self) -> bool:
+        return not self.coefficients and self.corner == np.inf
+
+    @property
+    def of_one_sample(self) -> float:
+        """Standard deviation."""
+        frequency = np.linspace(0.0, 0.5 / self.period, FINE)
+        return self.std * float(np.sqrt((self.density(frequency) * _gain(frequency / self.corner) ** 2).mean()))
+
+    @property
+    def passed(self) -> float:
+        """Hz up to which the channel is compared: beyond, a filter has taken away what moves."""
+        return PASSED * self.corner
+
+    def density(self, frequency: np.ndarray, means_over: int = 1) -> np.ndarray:
+        """Relative to that of white noise of `std`, at frequencies in Hz; means_over: of means over so many samples
+        each, which show what is faster than they are at a lower frequency, too."""
+        found, rate = np.zeros(len(frequency)), 1.0 / (means_over * self.period)
+        for k in range(means_over):
+            f = frequency + k * rate
+            share = np.sinc(f * means_over * self.period) / np.sinc(f * self.period)
+            found += share**2 * _density(self.coefficients, f, self.period)
+        return found / _slow_density(self.coefficients, self.period)
+
+    def unfiltered(self, values: np.ndarray) -> np.ndarray:
+        """Values (n,) of the channel with what its filter has taken in the band that is compared."""
+        if self.corner == np.inf:
+            return values
+        frequency = np.arange(len(values)) / (2.0 * len(values) * self.period)
+        gain = _gain(np.minimum(frequency / self.corner, PASSED))
+        return idct(dct(values, norm="ortho") / gain, norm="ortho")
+
+
+def noise_spectrum(values: np.ndarray, period: float) -> NoiseSpectrum:
+    """Of noise alone, values (n,)."""
+    n, values = len(values), values - values.mean()
+    white = NoiseSpectrum(float(np.std(values, ddof=1)), float(n), period=period)
+    variances, filters = _burg(values, min(MOST, n // PER_ORDER))
+    gained = n * np.log(variances[0] / variances)
+    order = int(np.argmax(gained - np.arange(len(variances)) * np.log(n)))
+    if order == 0 or chdtrc(order, gained[order]) > SIGNIFICANT:
+        return white
+    a = filters[order]
+    corner = _corner(a, period)
+    if corner < np.inf:
+        return _before_the_filter(values, corner, period)
+    worth = _worth(a, variances[order], n, values)
+    if worth < TOLD:
+        return white
+    strength = variances[order] * n / (n - 1.0 - order) * _slow_density(a, period)
+    return NoiseSpectrum(float(np.sqrt(strength)), worth, tuple(a), period=period)
+
+
+def _before_the_filter(values: np.ndarray, corner: float, period: float) -> NoiseSpectrum:
+    frequency = np.arange(len(values)) / (2.0 * len(values) * period)
+    inside = (frequency > 0.0) & (frequency < corner)
+    power = (dct(values, norm="ortho")[inside] / _gain(frequency[inside] / corner)) ** 2
+    return NoiseSpectrum(float(np.sqrt(power.mean())), float(len(power)), corner=corner, period=period)
+
+
+def _corner(a: np.ndarray, period: float) -> float:
+    frequency = np.linspace(0.0, 0.5 / period, FINE)
+    density = _density(a, frequency, period) / _slow_density(a, period)
+    ten, twenty = (_first(frequency, density < down) for down in (0.1, 0.01))
+    if not twenty < STEEP * ten:
+        return np.inf
+    found = ten / TEN_DOWN
+    nearest = min((CORNER * cfc for cfc in CFC_CLASSES), key=lambda f0: abs(np.log(f0 / found)))
+    return nearest if abs(np.log(nearest / found)) < ALIKE else found
+
+
+def _gain(of_corner: np.ndarray) -> np.ndarray:
+    return 1.0 / (1.0 + of_corner**4)
+
+
+def _first(frequency: np.ndarray, there: np.ndarray) -> float:
+    return float(frequency[there.argmax()]) if there.any() else np.inf
+
+
+def _burg(values: np.ndarray, most: int) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Variance of e and coefficients a, of each order from 0."""
+    forward, backward = values.copy(), values.copy()
+    variances, filters = [float(np.mean(values**2))], [np.zeros(0)]
+    for _ in range(most):
+        ahead, behind = forward[1:], backward[:-1]
+        power = float(ahead @ ahead + behind @ behind)
+        if not power > 0.0:
+            break
+        reflection = -2.0 * float(ahead @ behind) / power
+        filters.append(np.append(filters[-1], 0.0) + reflection * np.append(filters[-1][::-1], 1.0))
+        variances.append(variances[-1] * (1.0 - reflection**2))
+        forward, backward = ahead + reflection * behind, behind + reflection * ahead
+    return np.maximum(variances, np.finfo(float).tiny), filters
+
+
+def _density(a, frequency: np.ndarray, period: float) -> np.ndarray:
+    turn = np.exp(-2j * np.pi * period * np.outer(frequency, np.arange(1, len(a) + 1)))
+    return 1.0 / np.abs(1.0 + turn @ np.asarray(a, dtype=float)) ** 2
+
+
+def _slow_density(a, period: float) -> float:
+    return float(_density(a, np.linspace(0.0, min(SLOW, 0.5 / period), 33), period).mean())
+
+
+def _worth(a: np.ndarray, variance: float, n: int, values: np.ndarray) -> float:
+    """Independent samples from which a variance is known as well as S(0) is from n samples of coloured noise:
+
+    var ln S(0) = 2 / n + 4 s^2 1' R^-1 1 / (n (1 + sum a)^2), R the autocovariance of n(t); var ln s^2 = 2 / n.
+    """
+    autocovariance = [float(values[: n - k] @ values[k:]) / n for k in range(len(a))]
+    ones = np.ones(len(a))
+    spread = variance * float(ones @ np.linalg.solve(toeplitz(autocovariance), ones)) / (1.0 + a.sum()) ** 2
+    return max(n / (1.0 + 2.0 * max(spread, 0.0)), 2.0)

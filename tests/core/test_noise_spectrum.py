@@ -1,0 +1,75 @@
+"""The spectrum of a sensor's noise: its colour and its filter are found from 30 ms of rest."""
+
+import numpy as np
+import pytest
+from scipy.signal import butter, filtfilt, lfilter
+
+from crash_estimator.core.noise_spectrum import CORNER, NoiseSpectrum, noise_spectrum
+
+PERIOD, REST, TIMES = 1e-4, 300, 60
+
+
+def behind_a_pole(corner):
+    """White noise behind one pole, with the same standard deviation: ten times as strong at low frequencies."""
+    pole = np.exp(-2.0 * np.pi * corner * PERIOD)
+    return lambda white: lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], white)
+
+
+def filtered(cfc):
+    """SAE J211-1, appendix C."""
+    b, a = butter(2, CORNER * cfc, fs=1.0 / PERIOD)
+    return lambda white: filtfilt(b, a, white)
+
+
+def spectra(colour):
+    rng = np.random.default_rng(8)
+    return [noise_spectrum(colour(rng.standard_normal(3 * REST))[REST : 2 * REST], PERIOD) for _ in range(TIMES)]
+
+
+def test_white_noise_is_white_with_its_standard_deviation():
+    found = spectra(lambda white: white)
+    assert sum(one.white for one in found) >= TIMES - 2
+    assert np.median([one.std for one in found]) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("corner", (300.0, 800.0))
+def test_the_strength_of_coloured_noise_is_that_at_low_frequencies(corner):
+    pole = np.exp(-2.0 * np.pi * corner * PERIOD)
+    found = spectra(behind_a_pole(corner))
+    assert sum(one.white for one in found) <= 2, "30 ms can tell too little of what is slow"
+    found = [one for one in found if not one.white]
+    logarithm = np.log([one.std for one in found])
+    assert np.median(logarithm) == pytest.approx(0.5 * np.log((1.0 + pole) / (1.0 - pole)), abs=0.1)
+    told = np.median([one.samples for one in found])
+    assert np.std(logarithm) == pytest.approx(1.0 / np.sqrt(2.0 * told), rel=0.35), "as well as it says it is known"
+    assert np.median([one.of_one_sample for one in found]) == pytest.approx(1.0, abs=0.1)
+    high = np.array([2000.0])
+    expected = (1.0 - pole) ** 2 / np.abs(1.0 - pole * np.exp(-2j * np.pi * PERIOD * high)) ** 2
+    assert np.median([one.density(high) for one in found]) == pytest.approx(expected[0], rel=0.3)
+
+
+def test_means_of_white_noise_are_white():
+    white = NoiseSpectrum(1.0, REST, period=PERIOD)
+    np.testing.assert_allclose(white.density(np.linspace(0.0, 1250.0, 7), means_over=4), 1.0)
+
+
+@pytest.mark.parametrize("cfc", (180, 600))
+def test_the_filter_class_is_found_and_the_noise_before_it(cfc):
+    found = spectra(filtered(cfc))
+    assert sum(one.corner == CORNER * cfc for one in found) > 0.9 * TIMES
+    assert np.median([one.std for one in found]) == pytest.approx(1.0, abs=0.1)
+
+
+def test_what_the_filter_took_in_its_band_is_given_back():
+    time = np.arange(4000) * PERIOD
+    slow = np.exp(-(((time - 0.2) / 0.004) ** 2))  # to 100 Hz, about
+    b, a = butter(2, CORNER * 180, fs=1.0 / PERIOD)
+    seen = filtfilt(b, a, slow)
+    found = next(one for one in spectra(filtered(180)) if one.corner == CORNER * 180)
+    assert np.abs(found.unfiltered(seen) - slow).max() < 0.2 * np.abs(seen - slow).max()
+
+
+def test_a_body_that_sways_before_the_impact_says_nothing_of_the_noise():
+    rng = np.random.default_rng(3)
+    swaying = rng.standard_normal(REST) + 3.0 * np.sin(2.0 * np.pi * 10.0 * PERIOD * np.arange(REST))
+    assert noise_spectrum(swaying, PERIOD).white

@@ -1,0 +1,52 @@
+"""Sensors as they are: coloured, filtered, ringing, with zeros that drift, on bodies whose masses are off by a percent.
+
+The cases are the second generator's, of its development seeds."""
+
+import numpy as np
+import pytest
+
+from crash_estimator.benchmarks.second_judge import judge, right
+from crash_estimator.core.diagnosis.observation.whitening import filtered, weights
+from crash_estimator.core.noise_spectrum import NoiseSpectrum
+from crash_replay.second_generator.cases import case_of
+
+NOTHING_HIDDEN = (
+    "cab/nothing/1g/coloured/71100276", "sled/nothing/0.5g/cfc180/71100144", "cab/nothing/2g/ringing/71100243",
+    "side/nothing/0.5g/masses/71100013", "cab/nothing/0.5g/drifting/71100195", "side/nothing/1g/1khz/71100008",
+)  # fmt: skip
+HIDDEN = (
+    "side/path.linear/2g/cfc180/71100095", "cab/channel.gain/0.5g/coloured/71100039",
+    "wall/rate.log/2g/ringing/71100048",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NOTHING_HIDDEN)
+def test_a_right_model_is_adequate_with_sensors_as_they_are(name):
+    assert judge(case_of(name))["verdict"] == "adequate"
+
+
+@pytest.mark.parametrize("name", HIDDEN)
+def test_what_is_missing_is_named_with_sensors_as_they_are(name):
+    assert right(judge(case_of(name)))
+
+
+def test_coloured_noise_is_white_once_it_is_weighted():
+    n, period, pole = 4000, 1e-4, 0.8
+    rng = np.random.default_rng(2)
+    noise = np.zeros(n)
+    for k, e in enumerate(rng.standard_normal(n - 1), start=1):
+        noise[k] = pole * noise[k - 1] + e
+    spectrum = NoiseSpectrum(1.0 / (1.0 - pole), np.inf, (-pole,), period=period)  # S(0) of s = 1
+    white = filtered(noise[:, None] / spectrum.std, weights([spectrum], np.inf, n, period))[:, 0]
+    correlation = np.corrcoef(white[1:], white[:-1])[0, 1]
+    assert np.std(white) == pytest.approx(1.0, abs=0.05) and abs(correlation) < 0.05
+    assert np.corrcoef(noise[1:], noise[:-1])[0, 1] > 0.7
+
+
+def test_nothing_above_the_band_is_compared():
+    n, period = 1000, 1e-3
+    time = np.arange(n) * period
+    both = np.sin(2.0 * np.pi * 20.0 * time) + np.sin(2.0 * np.pi * 300.0 * time)
+    white = NoiseSpectrum(1.0, np.inf)
+    left = filtered(both[:, None], weights([white], 100.0, n, period))[:, 0]
+    assert np.abs(left - np.sin(2.0 * np.pi * 20.0 * time))[20:-20].max() < 0.1
