@@ -2,13 +2,18 @@
 
 The cases are the second generator's, of its development seeds."""
 
+import re
+
 import numpy as np
 import pytest
+import yaml
 
 from crash_estimator.benchmarks.second_judge import judge, right
+from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.core.diagnosis.observation.whitening import filtered, weights
 from crash_estimator.core.noise_spectrum import NoiseSpectrum
-from crash_replay.second_generator.cases import case_of
+from crash_estimator.model_file import ModelFile
+from crash_replay.second_generator.cases import case_of, drawn
 
 NOTHING_HIDDEN = (
     "cab/nothing/1g/coloured/71100276", "sled/nothing/0.5g/cfc180/71100144", "cab/nothing/2g/ringing/71100243",
@@ -28,6 +33,14 @@ def test_a_right_model_is_adequate_with_sensors_as_they_are(name):
 @pytest.mark.parametrize("name", HIDDEN)
 def test_what_is_missing_is_named_with_sensors_as_they_are(name):
     assert right(judge(case_of(name)))
+
+
+def test_what_rings_is_told():
+    it = drawn(case_of("cab/nothing/2g/ringing/71100243"))
+    structure = ModelFile.model_validate(yaml.safe_load(it.model_text)).structure()
+    assert re.search(
+        r"adequate: .*; what rings above 240 Hz, 1\.\d+ g, is left out$", diagnose(structure, it.recordings).text
+    )
 
 
 def test_coloured_noise_is_white_once_it_is_weighted():

@@ -109,7 +109,7 @@ def _noise(result: Result, k: int) -> float:
     measured = column_of(result.estimates, "measured", k)
     valid = np.isfinite(measured)
     time_ns = np.array([e.time_ns for e in result.estimates])
-    return sensor_noise(measured[valid], time_ns[valid], rests=True).std
+    return sensor_noise(measured[valid], time_ns[valid], rests=True).of_one_sample
 
 
 def equations_of(results: dict[str, Result]) -> list[tuple[str, str]]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from crash_replay.recording import Recording
 
-from .sensor_noise import by_differences
+from .differences import by_differences
 
 RUN = 4
 """Samples in a row at a channel's very largest or smallest value: two such already are chance in any noise, where the

@@ -12,7 +12,7 @@ import numpy as np
 
 from crash_replay.recording import Channel, Recording
 
-from .sensor_noise import by_differences
+from .differences import by_differences
 from .structure import Body, ModelError, Structure
 
 ORDER = 4

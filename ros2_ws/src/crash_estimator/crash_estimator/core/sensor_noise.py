@@ -1,8 +1,13 @@
 """How large a sensor's own noise is: from its rest before the impact and from its high-frequency content after it."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from .noise_spectrum import NoiseSpectrum, noise_spectrum
+from .differences import by_differences
+
+if TYPE_CHECKING:
+    from .noise_spectrum import NoiseSpectrum
 
 ENOUGH = 30
 """Samples before the impact from which their scatter is taken seriously."""
@@ -13,12 +18,6 @@ FAST = 4000.0
 AGREE = 1.25
 """Ratio up to which the two estimates are the same noise, and are pooled."""
 
-DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70.0)
-"""Fourth difference: blind to a cubic, unit gain for white noise."""
-
-NORMAL_MEDIAN = 0.6745
-"""Of the magnitude of a normal variable, in standard deviations."""
-
 EFFICIENCY = 0.19
 """Share of its samples that the median of fourth differences of white noise is worth (simulated)."""
 
@@ -26,9 +25,11 @@ SMALLEST = 1e-6
 """Share of the largest value that noise is taken to be at least: a simulation without any is divided by it too."""
 
 
-def sensor_noise(values: np.ndarray, time_ns: np.ndarray, rests: bool) -> NoiseSpectrum:
+def sensor_noise(values: np.ndarray, time_ns: np.ndarray, rests: bool) -> "NoiseSpectrum":
     """Of values (n,). A vibrating structure is noisier in the crash than at rest: then that is the floor a model can
     reach. Rest alone tells whether neighbouring samples are alike."""
+    from .noise_spectrum import NoiseSpectrum, noise_spectrum  # late: a viewer has started before there is any noise
+
     before, after = values[time_ns < 0], values[time_ns >= 0]
     period = float(np.median(np.diff(time_ns))) * 1e-9
     rests = rests and len(before) >= ENOUGH
@@ -56,11 +57,3 @@ def _highest_frequencies(values: np.ndarray) -> float:
     power = np.abs(np.fft.rfft((values - values.mean()) * np.hanning(len(values)))) ** 2
     highest = power[-(len(power) // 4) :]
     return float(np.sqrt(np.median(highest) / np.log(2.0) / np.sum(np.hanning(len(values)) ** 2)))
-
-
-def by_differences(values: np.ndarray) -> float:
-    """Standard deviation of white noise in values (n,), n >= 5, that else move slowly.
-
-    The median: jumps of the force are rare, and must not count as noise.
-    """
-    return float(np.median(np.abs(np.convolve(values, DIFFERENCE, "valid")))) / NORMAL_MEDIAN

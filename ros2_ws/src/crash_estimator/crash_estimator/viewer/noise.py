@@ -30,7 +30,7 @@ class NoiseFloor:
         time_ns, values = (np.concatenate(column) for column in zip(*self.heard[body]))
         valid = np.isfinite(values)
         time_ns, values = time_ns[valid], values[valid]
-        std = sensor_noise(values, time_ns, rests=True).std if len(values) >= 2 * ENOUGH else np.nan
+        std = sensor_noise(values, time_ns, rests=True).of_one_sample if len(values) >= 2 * ENOUGH else np.nan
         self.found[body] = self.samples[body], std
         return std
 

@@ -13,6 +13,7 @@ import numpy as np
 from crash_replay.conditioning import CFC_CLASSES, RATE_PER_CFC, cfc_filter
 
 from ...rating import rate
+from ..observation.whitening import filtered
 from ..output_error.normal_equations import may_diverge
 from ..parameterization.layout import Layout
 from ..residuals.residuals import rms
@@ -110,6 +111,16 @@ def left_by(model: Model, cfc: int | None) -> Left:
         noise.append(np.broadcast_to(floor, left.shape))
     worst_first = tuple(sorted(channels, key=lambda one: -one.of_peak))
     return Left(rms(layout, inside), rms(layout, noise), rms(layout, above), cfc, worst_first)
+
+
+def vibration_of(model: Model) -> float:
+    """m/s^2, RMS of what a model leaves above the band that it was compared in."""
+    above = []
+    for record, residual in zip(model.records, model.residuals.residual, strict=True):
+        values, n = np.nan_to_num(residual), len(residual)
+        inside = np.arange(n) / (2.0 * n * record.period) < record.below
+        above.append(values - filtered(values, np.repeat(inside[:, None], values.shape[1], axis=1)))
+    return rms(model.fit.layout, above)
 
 
 def _impulse_response(samples: int, period: float, cfc: int | None) -> np.ndarray:

@@ -6,7 +6,7 @@ from crash_replay.gravity import G
 
 from ..selection.fitted_model import Model
 from ..selection.thresholds import THRESHOLDS
-from .left import Left
+from .left import Left, vibration_of
 from .ranking import StepReport
 from .time_zero_step import TIME_ZERO, signals_begin
 from .tolerance import Tolerance
@@ -25,6 +25,9 @@ def verdict_text(
         said = f"effect missing: {_missing(evidence, tolerance, steps, first, final, floor)}"
     else:
         said = f"unexplained: {_unexplained(evidence, steps, first, final, floor)}"
+    below = final.records[0].below
+    if below < float("inf"):
+        said += f"; what rings above {below:g} Hz, {vibration_of(final) / G:.3g} g, is left out"
     said = said if as_given else f"{said}; with contacts that never pull, not even by their dampers"
     if steps and steps[0].effect == TIME_ZERO:
         moved = steps[0].shape or {steps[0].target: steps[0].coefficient}

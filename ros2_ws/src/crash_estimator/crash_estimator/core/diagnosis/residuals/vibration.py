@@ -25,7 +25,7 @@ def vibrates_from(residuals: Residuals, records: Sequence[ObservedRecord]) -> fl
             power, bands = power_in_bands(column[np.isfinite(column)], record.period, EDGES)
             quietest, noise_only = (np.inf, 1), True
             for low, _, inside in bands:
-                mean, count = float(power[inside].mean()), np.count_nonzero(inside)
+                mean, count = float(power[inside].mean()), int(np.count_nonzero(inside))
                 more_than_noise = probability_of(count, samples, mean) < SIGNIFICANT
                 rises = probability_of(count, quietest[1], mean / max(quietest[0], 1.0)) < SIGNIFICANT
                 if low >= SLOWEST and (rises or (noise_only and more_than_noise)):
