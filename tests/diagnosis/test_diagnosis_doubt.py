@@ -44,7 +44,7 @@ def test_a_model_that_explains_little_and_is_not_mended_is_doubted_below_the_ver
         command.main()
     said = capsys.readouterr().out.splitlines()
     assert status.value.code == 0 and said[0].startswith("unexplained")
-    why = "as given it explains 3% of barrier_fx"
+    why = "as given it explains 2% of barrier_fx"
     assert said[1:3] == [f"the model itself or the recording may be wrong ({why}): {ADVICE} (car 13.3 m/s)", ""]
 
 

@@ -98,8 +98,7 @@ def linearise(
     for k, parameter, column in driven_by(experiment, theta):
         actions.act(parameter, k, column)
     sampled, of_outputs = sampling(experiment, theta)
-    zeros = [*(layout.offsets[r] + q for q in range(len(layout.outputs))), *layout.drifts[r].values()]
-    for parameter in [*of_outputs, *zeros]:
+    for parameter in [*of_outputs, *(layout.offsets[r] + q for q in range(len(layout.outputs)))]:
         actions.columns.setdefault(parameter, 1 + len(actions.columns))
     defect = rows.copy()
     free = layout.kind == FREE

@@ -91,9 +91,6 @@ def predicted(experiment: Experiment, theta: np.ndarray, rows: np.ndarray, traje
         offset = layout.offsets[r] + q
         outputs[:, q] = (1.0 + d.gain) * true + d.offset + theta[offset]
         by.append((q, offset, np.ones(len(true))))
-        if q in layout.drifts[r]:
-            outputs[:, q] += theta[layout.drifts[r][q]] * record.time / record.time[-1]
-            by.append((q, layout.drifts[r][q], record.time / record.time[-1]))
         gain, delay, jump = d.parameters
         if gain >= 0:
             by.append((q, gain, true))

@@ -57,7 +57,7 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
         return path
     left = analyse(path.as_recorded)
     vibration = vibrates_from(left, records)
-    if vibration == np.inf or left.mean_square >= THRESHOLDS.real_structure:
+    if vibration == np.inf or left.mean_square >= THRESHOLDS.near_floor:
         return path
     return _selected(structure, [record.in_band(vibration) for record in records], effects)
 

@@ -25,7 +25,8 @@ class Thresholds(NamedTuple):
 
     # What is left, in units of the sensors' noise
     near_floor: float = 2.0
-    """Mean square below which a driven channel's error, or a finer curve, may be all that is missing."""
+    """Mean square below which a driven channel's error, a finer curve, or what rings, may be all that is left: to look
+    again takes as long as the first look."""
     real_structure: float = 100.0
     """Mean square from which on no second effect is looked for at once: of a real structure none takes that."""
     out_of_reach: float = 1000.0
