@@ -192,10 +192,10 @@ def test_a_signal_while_it_waits_ends_it_cleanly(bag, listener, number):
 
 
 def test_it_says_who_is_missing(bag, listener):
-    with Replay(bag, wait_for=2, wait_timeout=1) as replay:
+    with Replay(bag, wait_for=2, wait_timeout=3) as replay:  # a node may be found a second after its subscription
         status, output, errors = replay.end()
     assert (status, output) == (1, "")
-    expected = "only 1 of 2 subscribers on samples after 1 s (there: listener): start the others, or lower wait_for"
+    expected = "only 1 of 2 subscribers on samples after 3 s (there: listener): start the others, or lower wait_for"
     assert errors == f"error: {expected}\n"
     assert listener.messages == []
 

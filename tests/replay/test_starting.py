@@ -119,3 +119,13 @@ def test_what_is_held_comes_afterwards(number):
         assert came == [number]
     finally:
         signal.signal(number, before)
+
+
+def test_one_that_comes_as_it_ends_changes_nothing():
+    """Between the end of the command and that of Python: the exit status stands."""
+    lines = (
+        "import os, signal, sys", "from crash_replay.fault import guarded", "from crash_replay.starting import begin",
+        "begin()", "status = guarded(lambda: print('done'))", "os.kill(os.getpid(), signal.SIGINT)", "sys.exit(status)",
+    )  # fmt: skip
+    ended = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "done\n", "")

@@ -8,7 +8,7 @@ from rclpy.publisher import Publisher
 
 from .attendance import GONE, State
 from .attending import REPLAY, Attending, Progress
-from .subscribers import killed, node_name
+from .subscribers import UNNAMED, killed, node_name
 
 
 class Audience:
@@ -32,7 +32,8 @@ class Audience:
 
     def subscribed(self) -> list[str]:
         """Names of the nodes on `samples`."""
-        return [info.node_name for info in self.node.get_subscriptions_info_by_topic(self.samples.topic_name)]
+        found = self.node.get_subscriptions_info_by_topic(self.samples.topic_name)
+        return ["not yet known by name" if info.node_name == UNNAMED else info.node_name for info in found]
 
     def not_ready(self, names: Sequence[str]) -> list[str]:
         """Nodes of these whose subscription to `samples` is not found, or who have not said that they are ready."""

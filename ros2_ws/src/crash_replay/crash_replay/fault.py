@@ -76,10 +76,12 @@ def guarded(command: Callable[[], int | None], also: tuple[type[Exception], ...]
 def _signals_end_it() -> Iterator[None]:
     """Like Ctrl-C, unless they are dealt with already: a file that is half written would stay.
 
-    Who deals with them himself, as a node does, still does so afterwards: no signal changes how it has ended.
+    Who deals with them himself, as a node does, still does so afterwards: no signal changes how it has ended. Nor does
+    one that comes between the end of a command and that of its program.
     """
     ours = threading.current_thread() is threading.main_thread()
-    free = [number for number in ENDING if ours and signal.getsignal(number) in (signal.SIG_DFL, leave)]
+    found = {number: signal.getsignal(number) for number in ENDING if ours}
+    free = {number: handler for number, handler in found.items() if handler in (signal.SIG_DFL, leave)}
 
     def end(number: int, _) -> None:
         raise Ended(number)
@@ -89,9 +91,9 @@ def _signals_end_it() -> Iterator[None]:
             signal.signal(number, end)
         yield
     finally:
-        for number in free:
+        for number, handler in free.items():
             if signal.getsignal(number) is end:
-                signal.signal(number, signal.SIG_DFL)
+                signal.signal(number, signal.SIG_IGN if handler is leave else signal.SIG_DFL)
 
 
 @contextmanager

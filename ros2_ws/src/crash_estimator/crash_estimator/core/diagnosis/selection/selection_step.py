@@ -50,8 +50,7 @@ def selection_step(
     for _ in range(THRESHOLDS.inflations):
         if out_of_time():
             break
-        residuals = analyse(done.best.fit) if done.best else done.before.residuals
-        noisier = with_inflated_noise(model.records, bounded(residuals.residual, model.records))
+        noisier = _noise_left_by(done, model.records)
         before = fit_model(magnitudes, noisier, model.additions)
         problem = before.fit.problem
         for start in [done.before.fit, *(one.fit for one in done.candidates[:1] if one.fit)]:
@@ -62,6 +61,19 @@ def selection_step(
             before = before._replace(residuals=before.residuals._replace(band_test=decided))
         done = SelectionStep(before, fit_candidates(magnitudes, effects, before, in_other_noise=found), found)
     return done
+
+
+def _noise_left_by(step: SelectionStep, records: Sequence[ObservedRecord]) -> tuple[ObservedRecord, ...]:
+    """The records with the noise that the candidate leaves whose own makes the recordings likeliest.
+
+    Over the noise, too, the likelihood is largest where the determinant of its covariance over the channels is least.
+    In a given noise the candidate that leaves that is always ahead: there may be several for which this holds.
+    """
+    if not step.best:
+        return with_inflated_noise(records, bounded(step.before.residuals.residual, records))
+    better = [one for one in step.candidates if one.fit and one.gain > THRESHOLDS.gain]
+    noises = [with_inflated_noise(records, bounded(analyse(one.fit).residual, records)) for one in better]
+    return max(noises, key=lambda noise: np.linalg.slogdet(noise[0].whitener)[1])
 
 
 @may_diverge
