@@ -79,9 +79,9 @@ def test_in_a_namespace_only_where_it_is_asked_for(bag, listener):
         Listener("b", namespace="/sled_b") as b,
     ):
         wait_until(lambda: a.states and b.states)
-        assert publishers(listener) == ["replay"]
         heard = clocks_of(listener)
         wait_until(lambda: heard)
+        assert publishers(listener) == ["replay"]
         first.process.send_signal(signal.SIGINT)
         assert first.end()[0] == 0
         before = len(heard)

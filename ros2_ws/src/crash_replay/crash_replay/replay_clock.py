@@ -8,7 +8,7 @@ from rosgraph_msgs.msg import Clock
 
 from .qos import STREAM
 from .ros_messages import stamp
-from .subscribers import node_name
+from .subscribers import UNNAMED, node_name
 
 TOPIC = "/clock"
 
@@ -38,8 +38,11 @@ class ReplayClock:
         self.heard = [self.publisher] if self.publisher and self.publisher.get_subscription_count() else []
 
     def _goes_first(self) -> str:
-        """Another node that keeps publishing it, or ""; of two replays the same one gives way for both."""
-        publishers = self.node.get_publishers_info_by_topic(TOPIC)
+        """Another node that keeps publishing it, or ""; of two replays the same one gives way for both.
+
+        One whose name has not come yet is left for the next look: its own publisher may be seen before its node is.
+        """
+        publishers = [one for one in self.node.get_publishers_info_by_topic(TOPIC) if one.node_name != UNNAMED]
         name = self.node.get_fully_qualified_name()
         own = [info.endpoint_gid for info in publishers if node_name(info) == name]
         others = [info for info in publishers if node_name(info) != name]

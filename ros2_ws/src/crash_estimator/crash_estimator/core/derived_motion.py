@@ -18,7 +18,7 @@ from .structure import Body, ModelError, Structure
 ORDER = 4
 """Of the local polynomial: its second derivative is a parabola, as an acceleration between its inflections is."""
 WINDOWS = (5, 7, 11, 15, 21, 31, 43, 61, 85, 121)
-"""Samples, each about 1.4 times the one before."""
+"""Samples, each about 1.4 times the one before. The first passes through all of its samples, and leaves nothing."""
 FOLLOWS = 1.5
 """What a window leaves, as a multiple of what white noise leaves of it: more, and it has cut the motion itself."""
 
@@ -88,7 +88,7 @@ def smoothed(values: np.ndarray, period: float) -> Smoothed:
         nothing = np.full_like(values, np.nan)
         return Smoothed(values, nothing, nothing)
     noise = by_differences(values)
-    for window in WINDOWS:
+    for window in WINDOWS[1:]:
         if window > len(values):
             break
         kept = savgol_filter(values, window, ORDER)

@@ -81,4 +81,10 @@ class Estimate(NamedTuple):
     @property
     def std(self) -> np.ndarray:
         """(p,) standard deviation of each parameter."""
-        return np.sqrt(np.diagonal(self.covariance))
+        return standard_deviations(self.covariance)
+
+
+def standard_deviations(covariance: np.ndarray) -> np.ndarray:
+    """(p,) of a covariance (p, p); NaN where rounding has left none, as the thesis's recursions let it happen."""
+    variance = np.diagonal(covariance)
+    return np.sqrt(np.where(variance >= 0.0, variance, np.nan))

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..estimate import Event
+from ..estimate import Event, standard_deviations
 from ..regression import Regression
 from ..regressor_errors import MotionErrors
 from ..structure import ModelError
@@ -175,7 +175,7 @@ class GaussNewton:
             clamped=update.clamped[:parameters],
             expected_error=(expected, expected_after),
             extra=tuple(rls.theta[parameters:].tolist()),
-            extra_std=tuple(np.sqrt(np.diagonal(update.covariance)[parameters:]).tolist()),
+            extra_std=tuple(standard_deviations(update.covariance)[parameters:].tolist()),
         )
         return GaussNewtonState(rls, past, learning), update
 
