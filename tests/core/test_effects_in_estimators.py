@@ -1,5 +1,7 @@
 """Effects of a model file in the recursive estimators: known on the left side, unknown as one parameter more."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers_effects import SENSOR, hidden, last_of, parameter_of, place_of, with_it
@@ -15,7 +17,7 @@ from crash_estimator.core.estimate import Estimate, ParameterStatus
 from crash_estimator.core.fold import run
 from crash_estimator.core.free_run import free_run
 from crash_estimator.core.methods import make_estimator
-from crash_estimator.core.structure import Coefficient
+from crash_estimator.core.structure import Coefficient, EffectSpec, ModelError
 from crash_replay.recording import Recording
 
 IN_DUMMY = ("viscous_damping", "quadratic_damping", "coulomb_friction", "load_path")
@@ -198,6 +200,31 @@ def test_where_there_is_no_compiled_form_the_readable_one_is_taken(effect):
     _, what, recording, _ = hidden(effect, "frontal")
     estimator = make_estimator(with_it(effect, "frontal", what.coefficient), recording.test, "constrained_kalman")
     assert not isinstance(estimator, CompiledEstimator)
+
+
+def test_a_zero_that_drifts_is_taken_out():
+    recording = oscillator_recording(noise=0.0)
+    after = np.maximum(recording.time_ns, 0) * 1e-9
+    values = recording.values.copy()
+    values[:, 0] += 3.0 * after / 0.1
+    channel = recording.test.channels[0].name
+    model = replace(oscillator(), effects=(EffectSpec("channel_offset", channel, 3.0, variant="drift"),))
+    drifted = Recording(recording.test, recording.time_ns, values)
+    found = run(make_estimator(model, drifted.test, "rls"), drifted.samples())
+    plain = run(make_estimator(oscillator(), recording.test, "rls"), recording.samples())
+    assert_allclose([e.measured for e in found], [e.measured for e in plain], rtol=0.0, atol=1e-9)
+
+
+def test_a_drift_cannot_be_followed_and_other_effects_have_no_such_form():
+    recording = oscillator_recording(noise=0.0)
+    channel = recording.test.channels[0].name
+    for spec, said in (
+        (EffectSpec("channel_offset", channel, variant="drift"), "coefficient, in m/s"),
+        (EffectSpec("channel_gain", channel, 0.05, variant="drift"), "channel_gain has no form 'drift'; leave it out"),
+        (EffectSpec("channel_offset", channel, 3.0, variant="ramp"), "has no form 'ramp'; it has drift"),
+    ):
+        with pytest.raises(ModelError, match=said):
+            make_estimator(replace(oscillator(), effects=(spec,)), recording.test, "rls")
 
 
 def test_a_late_channel_is_brought_back_in_time():

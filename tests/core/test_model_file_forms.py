@@ -2,6 +2,7 @@
 
 import pytest
 
+from crash_estimator.core.effects import EFFECTS
 from crash_estimator.model_file import load_model
 
 MODEL = """
@@ -28,5 +29,5 @@ def test_an_unknown_form_is_one_line_with_its_place(tmp_path):
     path = tmp_path / "two.yaml"
     path.write_text(MODEL.format(key="form").replace("one_way", "sideways"))
     with pytest.raises(Exception, match=r"two.yaml:10: .*form.*one_way") as caught:
-        load_model(path)
+        load_model(path, EFFECTS)
     assert "\n" not in str(caught.value)

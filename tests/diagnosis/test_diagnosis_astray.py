@@ -40,8 +40,8 @@ def fitted(*case):
 @cache
 def searched():
     """Steps and the last model of a case that the vocabulary cannot explain."""
-    magnitudes, _ = fitted(*ROTATING_IMPACTOR)
-    return forward_selection(magnitudes, EFFECTS)
+    magnitudes, given = fitted(*ROTATING_IMPACTOR)
+    return forward_selection(magnitudes, EFFECTS, given)
 
 
 def test_what_a_model_leaves_as_given_is_what_its_own_simulation_leaves():

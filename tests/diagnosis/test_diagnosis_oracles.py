@@ -103,6 +103,7 @@ EVERY_EFFECT = (
     EffectSpec("channel_delay", "plate_ax", 2.5e-4),
     EffectSpec("channel_gain", "plate_ax", 0.04),
     EffectSpec("channel_offset", "striker_ax", 5.0),
+    EffectSpec("channel_offset", "striker_ax", 5.0, variant="drift"),
 )
 
 
@@ -138,7 +139,7 @@ NEAR = dict.fromkeys(EFFECTS, 0.03) | {"rate_hardening": 0.1}
 where the rate passes through zero: its slope there is infinite, and a mean over 2 mm/s stands for it."""
 
 
-@pytest.mark.parametrize("effect", EVERY_EFFECT, ids=lambda effect: effect.type)
+@pytest.mark.parametrize("effect", EVERY_EFFECT, ids=lambda effect: effect.type + effect.variant)
 def test_the_derivatives_of_the_outputs_are_their_finite_differences(effect, recording):
     problem, point = problem_of(structure(effect), recording)
     (experiment,) = problem.experiments

@@ -1,4 +1,4 @@
-"""Sensors as they are: coloured, filtered, ringing.
+"""Sensors as they are: coloured, filtered, ringing, with zeros that drift, on bodies whose masses are off by a percent.
 
 The cases are the second generator's, of its development seeds."""
 
@@ -17,7 +17,7 @@ from crash_replay.second_generator.cases import case_of, drawn
 
 NOTHING_HIDDEN = (
     "cab/nothing/1g/coloured/71100276", "sled/nothing/0.5g/cfc180/71100144", "cab/nothing/2g/ringing/71100243",
-    "side/nothing/1g/1khz/71100008",
+    "side/nothing/0.5g/masses/71100013", "cab/nothing/0.5g/drifting/71100195", "side/nothing/1g/1khz/71100008",
 )  # fmt: skip
 HIDDEN = (
     "side/path.linear/2g/cfc180/71100095", "cab/channel.gain/0.5g/coloured/71100039",

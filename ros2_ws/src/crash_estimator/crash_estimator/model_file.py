@@ -182,7 +182,7 @@ class EffectPart(Part):
     host: Text | None = None
     touches: Text | None = None
     taken_from: Text | None = None
-    form: Literal["", "absolute", "one_way", "one_way_back"] = Field(
+    form: Text = Field(
         "",
         validation_alias=AliasChoices("form", "variant"),  # as files written before have it
     )

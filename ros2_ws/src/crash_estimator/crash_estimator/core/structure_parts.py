@@ -103,7 +103,7 @@ class EffectSpec:
     host: str | None = None  # unmodelled_body: the body that feels its inertia
     touches: str | None = None  # unmodelled_body: the body that it pushes by a curve of its own
     taken_from: str | None = None  # unmodelled_body: the body whose mass it was counted in
-    variant: str = ""  # load_path: "", "absolute", "one_way" or "one_way_back"
+    variant: str = ""  # one of the effect's `variants`
 
 
 @dataclass(frozen=True)

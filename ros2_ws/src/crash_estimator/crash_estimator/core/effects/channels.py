@@ -1,6 +1,6 @@
 """Known errors of channels, taken out of the samples before an estimator sees them.
 
-    recorded(t) = (1 + gain) true(t - delay) + offset,    the offset from time zero on
+    recorded(t) = (1 + gain) true(t - delay) + offset(t),    the offset from time zero on
 
 What a late channel says of an instant comes later than the others: all wait for the latest, so that the estimates
 are of the instant `longest delay` before their sample.
@@ -18,23 +18,43 @@ from . import EFFECTS
 from .effect import Effect
 
 
+class Offset(NamedTuple):
+    """What is added to a channel."""
+
+    channel: int
+    effect: Effect
+    form: str
+    coefficient: float  # SI
+
+
 class ChannelErrors(NamedTuple):
     """(channels,) each."""
 
     gain: np.ndarray
-    offset: np.ndarray  # SI
     delay: np.ndarray  # s
+    offsets: tuple[Offset, ...] = ()
+
+    def offset(self, seconds: float) -> np.ndarray:
+        """SI, at an instant after the impact."""
+        found = np.zeros(len(self.gain))
+        for one in self.offsets:
+            found[one.channel] += one.coefficient * float(one.effect.course(one.form, np.array(seconds)))
+        return found
 
 
 def known_errors(structure: Structure, test: Test, effects: Mapping[str, Effect] = EFFECTS) -> ChannelErrors | None:
     """Those that the model's effects give a coefficient for; None: there are none."""
-    found, any_known = ChannelErrors(*np.zeros((3, len(test.channels)))), False
+    found, offsets, any_known = ChannelErrors(*np.zeros((2, len(test.channels)))), [], False
     for spec in structure.effects:
         effect = effects.get(spec.type)
-        if effect is not None and effect.distorts and spec.coefficient is not None:
-            getattr(found, effect.distorts)[test.index(spec.target, f"effect {spec.type}")] += spec.coefficient
-            any_known = True
-    return found if any_known else None
+        if effect is None or not effect.distorts or spec.coefficient is None:
+            continue
+        channel, any_known = test.index(spec.target, f"effect {spec.type}"), True
+        if effect.distorts == "offset":
+            offsets.append(Offset(channel, effect, spec.variant, spec.coefficient))
+        else:
+            getattr(found, effect.distorts)[channel] += spec.coefficient
+    return found._replace(offsets=tuple(offsets)) if any_known else None
 
 
 class CorrectedState(NamedTuple):
@@ -55,7 +75,7 @@ class Corrected:
 
     def step(self, state: CorrectedState, sample: Sample):
         """Fold one sample in; `state` is left as it was."""
-        offset = self.errors.offset if sample.time_ns >= 0 else 0.0
+        offset = self.errors.offset(sample.time_ns * 1e-9) if sample.time_ns >= 0 else 0.0
         values = (sample.values - offset) / (1.0 + self.errors.gain)
         recent, instant = (*state.recent, (sample.time_ns, values)), sample.time_ns
         if self.longest > 0.0:

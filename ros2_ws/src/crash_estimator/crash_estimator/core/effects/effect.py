@@ -137,6 +137,10 @@ class Effect:
         """A body, and the force (g,) N on it for one unit; inertial(channel): acceleration (g,) of an attached body."""
         return None
 
+    def course(self, variant: str, time: np.ndarray) -> np.ndarray:
+        """(g,) of what it adds to a channel, for one unit; time (g,): s since the impact."""
+        raise TypeError(f"effect {self.name} is of a kind that adds nothing to a channel: {type(self).__name__}")
+
     # --- the search of a diagnosis
 
     def candidates(self, structure: Structure, magnitudes: "Magnitudes") -> Iterator["Addition"]:

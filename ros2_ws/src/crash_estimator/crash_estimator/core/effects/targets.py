@@ -27,7 +27,7 @@ def check_effects(structure: Structure, effects: Mapping[str, Effect]) -> None:
 def checked(structure: Structure, spec: EffectSpec, effects: Mapping[str, Effect], test: Test | None = None) -> Effect:
     """The effect that a model's entry means.
 
-    Raises ModelError with one line where there is no such effect, or its target, shape constant or body is not one.
+    Raises ModelError with one line where there is no such effect, or its target, shape constant, form or body is none.
     """
     effect = _known(structure, spec.type, effects)
     what = f"model {structure.name}: effect {spec.type}"
@@ -39,6 +39,9 @@ def checked(structure: Structure, spec: EffectSpec, effects: Mapping[str, Effect
     for name in spec.shape:
         if name not in effect.shapes:
             raise ModelError(f"{what} has no shape constant {name!r}; it has {', '.join(effect.shapes) or 'none'}")
+    if spec.variant not in effect.variants:
+        forms = ", ".join(filter(None, effect.variants))
+        raise ModelError(f"{what} has no form {spec.variant!r}; " + (f"it has {forms}" if forms else "leave it out"))
     if spec.coefficient is not None:
         _admissible(f"{what} on {spec.target}", spec.coefficient, effect)
     for name, value in spec.shape.items():

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...effects.effect import Addition
 from ..observation.record import DRIVEN_MODES, ObservedRecord
 from ..observation.trajectory import Trajectory, integrate
 from ..parameterization.experiment import Experiment
@@ -13,12 +14,25 @@ from ..parameterization.magnitudes import attached_start
 
 
 class Distortion(NamedTuple):
-    """A channel's error: recorded(t) = (1 + gain) true(t - delay) + offset, and its parameters (-1: none)."""
+    """A channel's error: recorded(t) = (1 + gain) true(t - delay) + offset(t), and its parameters (-1: none)."""
 
     gain: float = 0.0
     delay: float = 0.0
-    offset: float = 0.0
-    parameters: tuple[int, int, int] = (-1, -1, -1)
+    by_gain: int = -1
+    by_delay: int = -1
+    offsets: tuple[tuple[int, float, Addition], ...] = ()  # parameter, its value, what it is of
+
+    @property
+    def parameters(self) -> list[int]:
+        return [p for p in (self.by_gain, self.by_delay, *(p for p, _, _ in self.offsets)) if p >= 0]
+
+    def offset(self, time: np.ndarray) -> np.ndarray | float:
+        """(g,) at s since the impact."""
+        return sum(value * one.effect.course(one.variant, time) for _, value, one in self.offsets)
+
+    def offset_by(self, time: np.ndarray) -> list[tuple[int, np.ndarray]]:
+        """Its derivatives: (parameter, (g,))."""
+        return [(p, one.effect.course(one.variant, time)) for p, _, one in self.offsets]
 
 
 NO_DISTORTION = Distortion()
@@ -28,12 +42,17 @@ def distortion(layout: Layout, theta: np.ndarray, channel: str) -> Distortion:
     terms = [t for t in layout.terms if t.addition.target == channel and t.addition.effect.distorts]
     if not terms:
         return NO_DISTORTION
-    found, parameters = {"gain": 0.0, "delay": 0.0, "offset": 0.0}, {"gain": -1, "delay": -1, "offset": -1}
+    found = NO_DISTORTION
     for term in terms:
-        found[term.addition.effect.distorts] = float(theta[term.coefficient])
-        parameters[term.addition.effect.distorts] = term.coefficient
-    found["delay"] = max(found["delay"], 0.0)  # at its limit it may be a rounding error below
-    return Distortion(**found, parameters=tuple(parameters.values()))
+        p, value = term.coefficient, float(theta[term.coefficient])
+        match term.addition.effect.distorts:
+            case "gain":
+                found = found._replace(gain=value, by_gain=p)
+            case "delay":  # at its limit it may be a rounding error below
+                found = found._replace(delay=max(value, 0.0), by_delay=p)
+            case "offset":
+                found = found._replace(offsets=(*found.offsets, (p, value, term.addition)))
+    return found
 
 
 def driven_motion(experiment: Experiment, theta: np.ndarray) -> np.ndarray:
@@ -56,15 +75,13 @@ def driven_by(experiment: Experiment, theta: np.ndarray) -> list[tuple[int, int,
         for name in names:
             d = distortion(layout, theta, name)
             true, share = true_acceleration(record, name, d), 1.0 / len(names)
-            gain, delay, offset = d.parameters
-            if gain >= 0:
-                by.append((k, gain, -share * true / (1.0 + d.gain)))
-            if offset >= 0:
-                by.append((k, offset, np.full(len(true), -share / (1.0 + d.gain))))
-            if delay >= 0:
+            if d.by_gain >= 0:
+                by.append((k, d.by_gain, -share * true / (1.0 + d.gain)))
+            by += [(k, p, -share / (1.0 + d.gain) * course) for p, course in d.offset_by(record.time)]
+            if d.by_delay >= 0:
                 signal, after, step = record.signals[name], record.time + d.delay, 0.5 * record.step
                 up, down = (np.interp(after + s * step, signal.time, signal.values) for s in (1.0, -1.0))
-                by.append((k, delay, share * (up - down) / (2.0 * step) / (1.0 + d.gain)))
+                by.append((k, d.by_delay, share * (up - down) / (2.0 * step) / (1.0 + d.gain)))
         first = layout.modes[r][k]
         by += [(k, first + j, record.cosines[:, j]) for j in range(DRIVEN_MODES + 1)]
     return by
@@ -80,7 +97,7 @@ def true_acceleration(record: ObservedRecord, channel: str, d: Distortion) -> np
     """(g,) What a channel has measured, if it errs like that."""
     signal = record.signals[channel]
     recorded = np.interp(record.time + d.delay, signal.time, signal.values) if d.delay else signal.on_grid
-    return (recorded - d.offset) / (1.0 + d.gain)
+    return (recorded - d.offset(record.time)) / (1.0 + d.gain)
 
 
 def start_values(layout: Layout, record: ObservedRecord) -> tuple[np.ndarray, np.ndarray]:

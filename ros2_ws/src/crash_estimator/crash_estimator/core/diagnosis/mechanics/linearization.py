@@ -98,7 +98,8 @@ def linearise(
     for k, parameter, column in driven_by(experiment, theta):
         actions.act(parameter, k, column)
     sampled, of_outputs = sampling(experiment, theta)
-    for parameter in [*of_outputs, *(layout.offsets[r] + q for q in range(len(layout.outputs)))]:
+    zeros = [*(layout.offsets[r] + q for q in range(len(layout.outputs))), *layout.drifts[r].values()]
+    for parameter in [*of_outputs, *zeros]:
         actions.columns.setdefault(parameter, 1 + len(actions.columns))
     defect = rows.copy()
     free = layout.kind == FREE

@@ -25,6 +25,8 @@ def masses(layout: Layout, theta: np.ndarray) -> np.ndarray:
 
 def mass_shares(layout: Layout) -> Iterator[tuple[int, int, float]]:
     """(body, parameter, kg for one unit of it)."""
+    for k, parameter in layout.weighed.items():
+        yield k, parameter, layout.structure.bodies[k].mass
     for term in layout.terms:
         for name, share in term.addition.effect.mass_shares(term.addition).items():
             yield layout.structure.body_index[name], term.coefficient, share

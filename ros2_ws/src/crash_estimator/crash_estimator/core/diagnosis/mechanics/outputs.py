@@ -51,7 +51,7 @@ def output_noise(experiment: Experiment, theta: np.ndarray, samples: int = 1) ->
 
 def _delay(layout: Layout, theta: np.ndarray, channel: str) -> tuple[float, int]:
     found = distortion(layout, theta, channel)
-    return found.delay, found.parameters[1]
+    return found.delay, found.by_delay
 
 
 def sampling(experiment: Experiment, theta: np.ndarray) -> tuple[Sampling, list[int]]:
@@ -59,7 +59,7 @@ def sampling(experiment: Experiment, theta: np.ndarray) -> tuple[Sampling, list[
     layout, record, _ = experiment
     found = [distortion(layout, theta, output.channel) for output in layout.outputs]
     lag = np.array([d.delay / record.step for d in found])
-    parameters = [p for d in found for p in d.parameters if p >= 0]
+    parameters = [p for d in found for p in d.parameters]
     return Sampling(
         body=np.array([output.body for output in layout.outputs]),
         of_motion=np.array([output.of_motion for output in layout.outputs]),
@@ -89,17 +89,18 @@ def predicted(experiment: Experiment, theta: np.ndarray, rows: np.ndarray, traje
             true += fraction * _delayed(shown, whole + 1)
             true[whole : whole + 1] = 0.0  # still an instant before the impact
         offset = layout.offsets[r] + q
-        outputs[:, q] = (1.0 + d.gain) * true + d.offset + theta[offset]
+        outputs[:, q] = (1.0 + d.gain) * true + d.offset(record.time) + theta[offset]
         by.append((q, offset, np.ones(len(true))))
-        gain, delay, jump = d.parameters
-        if gain >= 0:
-            by.append((q, gain, true))
-        if jump >= 0:
-            by.append((q, jump, np.ones(len(true))))
-        if delay >= 0:
+        if q in layout.drifts[r]:
+            outputs[:, q] += theta[layout.drifts[r][q]] * record.time / record.time[-1]
+            by.append((q, layout.drifts[r][q], record.time / record.time[-1]))
+        by += [(q, p, course) for p, course in d.offset_by(record.time)]
+        if d.by_gain >= 0:
+            by.append((q, d.by_gain, true))
+        if d.by_delay >= 0:
             slope = (_delayed(shown, whole + 1) - _delayed(shown, whole)) / step
             slope[whole : whole + 1] *= fraction == 0.0
-            by.append((q, delay, (1.0 + d.gain) * slope))
+            by.append((q, d.by_delay, (1.0 + d.gain) * slope))
     return outputs, by
 
 

@@ -92,6 +92,7 @@ class ObservedRecord(NamedTuple):
     cosines: np.ndarray  # (g, 1 + DRIVEN_MODES), the mean first
     whitener: np.ndarray | None = None  # (q, q) of outputs in units of their noise; None: independent, as the sensors'
     below: float = np.inf  # Hz: the band that is compared
+    in_doubt: bool = False  # masses may be off by what scales miss, and zeros drift
     weight: np.ndarray | None = None  # (bins, q) of the outputs' frequencies, `whitening.weights`; None: all alike
 
     @property
@@ -108,6 +109,10 @@ class ObservedRecord(NamedTuple):
         """Compared below so many Hz only."""
         weight = weights(self.spectra, below, self.bins, self.period, self.per_bin)
         return self._replace(below=below, weight=weight)
+
+    def doubted(self) -> "ObservedRecord":
+        """With masses and zeros that may err as such do."""
+        return self._replace(in_doubt=True)
 
     @property
     def compared(self) -> np.ndarray:

@@ -34,6 +34,8 @@ def _parameters(last: Fit, layout: Layout) -> np.ndarray:
     for r, first in enumerate(layout.offsets):
         outputs = np.arange(len(layout.outputs))
         theta[first + outputs] = last.theta[old.offsets[r] + outputs]
+        for q, drift in layout.drifts[r].items():
+            theta[drift] = last.theta[old.drifts[r][q]]
         for body, mode in layout.modes[r].items():
             modes = np.arange(DRIVEN_MODES + 1)
             theta[mode + modes] = last.theta[old.modes[r][body] + modes]

@@ -72,6 +72,7 @@ def embedding(base: Layout, wide: Layout) -> np.ndarray:
     found = [*range(base.knots), *(names[name] for name in base.names)]
     for r in range(len(base.offsets)):
         found += [wide.offsets[r] + q for q in range(len(base.outputs))]
+        found += [wide.drifts[r][q] for q in base.drifts[r]]
         for body in base.modes[r]:
             found += [wide.modes[r][body] + j for j in range(DRIVEN_MODES + 1)]
         found += [wide.kicks[r][body] for body in base.kicks[r]]

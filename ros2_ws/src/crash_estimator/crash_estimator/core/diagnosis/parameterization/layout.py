@@ -1,7 +1,7 @@
 """What is fitted: the parameters of a structure with its effects on some recordings, their priors and limits.
 
 Parameters stand in this order: forces at the curves' knots, then constants of elements and effects, then for each
-recording the nuisances (zero-offset errors of its outputs, slow error of its driven motions).
+recording the nuisances (errors and drifts of its outputs' zeros, slow errors of its driven motions).
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ import numpy as np
 
 from ...effects.effect import Addition
 from ...structure import Coefficient, Structure
-from ..observation.record import DRIVEN_MODES, ObservedRecord, comparable, outputs_of
+from ..observation.record import DRIVEN_MODES, ObservedRecord, Output, comparable, outputs_of
 from ..observation.trajectory import Trajectory
 from .free_curve import ROUGHNESS, Curve, make_knots
 from .magnitudes import Magnitudes
@@ -21,6 +21,14 @@ from .terms import Link, Term
 FREE, DRIVEN, FIXED = 0, 1, 2
 """How a body moves: by forces, as its channels say, or not at all. The compiled passes know these codes."""
 
+
+WEIGHED_TO = 0.01
+"""Standard deviation of a mass, as a share of it: scales are better, but what of a structure moves with its sensor is
+hardly known to a percent."""
+
+DRIFT = 0.002
+"""Of a channel's peak, standard deviation at the recording's end: the zero of an accelerometer that is shaken and warms
+up drifts by some 0.1 g in a crash of 50 g."""
 
 START_ERRS = 0.3
 """Of the velocity's standard deviation: wide, since a derivative at the end of a channel has half of the samples to go
@@ -41,8 +49,10 @@ class Layout(NamedTuple):
     terms: tuple[Term, ...]  # of every addition, in their order
     attached: dict[str, int]  # channel of an attached body -> its body
     offsets: tuple[int, ...]  # per record: first of its outputs' zero-offset errors
+    drifts: tuple[dict[int, int], ...]  # per record, in doubt: output that is an acceleration -> its zero at the end
     modes: tuple[dict[int, int], ...]  # per record: driven body -> first of its modes
     kicks: tuple[dict[int, int], ...]  # per record: body that starts as its own channel says -> error of its velocity
+    weighed: dict[int, int]  # in doubt: free body -> relative error of its mass
     prior: Prior
     start: np.ndarray  # (p,)
     names: tuple[str, ...]  # of the common parameters after the knots
@@ -104,18 +114,20 @@ def make_layout(
     placed = [term.addition for term in terms]
     terms += [_term(b, one, magnitudes) for one in additions if not any(one is other for other in placed)]
     terms.sort(key=lambda term: next(k for k, addition in enumerate(additions) if addition is term.addition))
+    weighed = _weighed(b, structure) if records[0].in_doubt else {}
     common = len(b.start)
     outputs = comparable(outputs_of(structure), structure, records)
-    offsets, modes, kicks = [], [], []
+    offsets, drifts, modes, kicks = [], [], [], []
     for r, record in enumerate(records):
         offsets.append(len(b.start))
         for q in range(len(outputs)):
             b.add("offset", 0.0, max(record.offset_std[q], 1e-9))
+        drifts.append(_drifts(b, outputs, record) if record.in_doubt else {})
         modes.append(_modes(b, structure, record, attached))
         kicks.append(_kicks(b, structure, magnitudes.measured[r]))
     return Layout(
         structure, tuple(links), tuple(bodies), np.array(kind), outputs, knots, common, len(b.start), tuple(terms),
-        attached, tuple(offsets), tuple(modes), tuple(kicks), b.prior(), np.array(b.start),
+        attached, tuple(offsets), tuple(drifts), tuple(modes), tuple(kicks), weighed, b.prior(), np.array(b.start),
         tuple(b.names[knots:common]),
     )  # fmt: skip
 
@@ -187,6 +199,25 @@ def _term(b: Builder, addition: Addition, magnitudes: Magnitudes) -> Term:
             high,
         )
     return Term(addition, coefficient, shapes)
+
+
+def _weighed(b: Builder, structure: Structure) -> dict[int, int]:
+    """Errors of the masses, where anything tells of them: of one body alone, M a = F hides a mass in the law."""
+    free = [k for k, body in enumerate(structure.bodies) if body.free]
+    told = len(free) > 1 or any(structure.bodies[k].fixed for k in structure.equations)
+    return {k: _bounded(b, f"{structure.bodies[k].name}.mass", WEIGHED_TO) for k in free if told}
+
+
+def _drifts(b: Builder, outputs: Sequence[Output], record: ObservedRecord) -> dict[int, int]:
+    """Zeros at the recording's end, of the accelerometers."""
+    felt = [q for q, output in enumerate(outputs) if output.quantity == "acceleration"]
+    peak = np.nanmax(np.abs(record.measured), axis=0)
+    return {q: _bounded(b, "drift", max(DRIFT * peak[q], 1e-9)) for q in felt}
+
+
+def _bounded(b: Builder, name: str, std: float) -> int:
+    """An error within three standard deviations: what a wrong model leaves is no reason for a larger one."""
+    return b.add(name, 0.0, std, low=-3.0 * std, high=3.0 * std)
 
 
 def _modes(b: Builder, structure: Structure, record: ObservedRecord, attached: dict[str, int]) -> dict[int, int]:

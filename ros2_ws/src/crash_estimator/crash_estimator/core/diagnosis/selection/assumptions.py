@@ -63,10 +63,10 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
 
 
 def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
-    path = _with_curves_as_fine_as_needed(structure, records, effects)
+    path = _as_exact_as_needed(structure, records, effects)
     pushing = never_pulling(structure)
     if pushing is not structure and not out_of_time() and _may_be_explained_by(pushing, path, records):
-        path = max(path, _with_curves_as_fine_as_needed(pushing, records, effects), key=SelectionPath.rank)
+        path = max(path, _as_exact_as_needed(pushing, path.records, effects), key=SelectionPath.rank)
     return path
 
 
@@ -125,16 +125,51 @@ def _contacts_pull(fitted: Fit) -> bool:
     return False
 
 
-def _with_curves_as_fine_as_needed(
+def _as_exact_as_needed(
     structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]
 ) -> SelectionPath:
+    """Masses and zeros are as stated, unless nothing but noise is left with errors of them such as scales and sensors
+    have: by the model as given, or with fewer effects than were found."""
+    magnitudes, given = _as_given(structure, records, effects)
+    if records[0].in_doubt:
+        return _with_curves_as_fine_as_needed(magnitudes, given, effects)
+    doubted = [record.doubted() for record in records]
+    doubtful = _white_in_doubt(magnitudes, given, doubted)
+    path = None if doubtful else _with_curves_as_fine_as_needed(magnitudes, given, effects)
+    if path:
+        models = [step.before for step in path.steps[1:] if step.before is not path.final]
+        models += [] if path.final.white else [path.final]
+        if out_of_time() or not any(_white_in_doubt(magnitudes, model, doubted) for model in models):
+            return path
+    other = _with_curves_as_fine_as_needed(*_as_given(structure, doubted, effects), effects)
+    if path is None or (other.final.white and (not path.final.white or len(other.steps) < len(path.steps))):
+        return other
+    return path
+
+
+def _as_given(
+    structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]
+) -> tuple[Magnitudes, Model]:
     magnitudes = measure_magnitudes(structure, records, CELLS)
-    present = additions_of(structure, magnitudes, effects)
-    steps, final = forward_selection(magnitudes, effects, present)
+    return magnitudes, fit_model(magnitudes, records, additions_of(structure, magnitudes, effects))
+
+
+def _white_in_doubt(magnitudes: Magnitudes, model: Model, doubted: Sequence[ObservedRecord]) -> bool:
+    """Whether a model leaves nothing but noise if masses and zeros may err."""
+    if model.white or model.residuals.mean_square >= THRESHOLDS.real_structure:
+        return model.white
+    return fit_model(magnitudes._replace(records=doubted), doubted, model.additions).white
+
+
+def _with_curves_as_fine_as_needed(
+    magnitudes: Magnitudes, given: Model, effects: Mapping[str, Effect]
+) -> SelectionPath:
+    structure, records, present = magnitudes.structure, magnitudes.records, given.additions
+    steps, final = forward_selection(magnitudes, effects, given)
     as_recorded = in_the_sensors_noise(final, records)
     finer = measure_magnitudes(structure, records, FINER_CELLS)
     if not out_of_time() and _wants_finer_curves(final, analyse(as_recorded), finer, len(present)):
-        finer_steps, finer_final = forward_selection(finer, effects, present)
+        finer_steps, finer_final = forward_selection(finer, effects, fit_model(finer, records, present))
         fewer = len(finer_final.additions) < len(final.additions) or not final.white
         if finer_final.white and fewer:
             steps, final = finer_steps, finer_final

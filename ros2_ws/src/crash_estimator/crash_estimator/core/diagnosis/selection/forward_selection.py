@@ -1,13 +1,13 @@
 """Forward selection: fit the candidates, add the best, until nothing is left or nothing helps."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from ...effects.effect import Addition, Effect
+from ...effects.effect import Effect
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
 from .acceptance import better, explains_too_little, needed_gain
 from .candidate_fits import CandidateFit
-from .fitted_model import Model, fit_model
+from .fitted_model import Model
 from .pair_search import two_at_once
 from .pruning import up_to_the_least_error, without_the_superseded
 from .selection_step import SelectionStep, added, selection_step
@@ -16,10 +16,10 @@ from .time_limit import out_of_time
 
 
 def forward_selection(
-    magnitudes: Magnitudes, effects: Mapping[str, Effect], present: Sequence[Addition] = ()
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], given: Model
 ) -> tuple[list[SelectionStep], Model]:
-    """All steps, and the last model."""
-    given = fit_model(magnitudes, magnitudes.records, present)
+    """All steps, and the last model; given: what it starts from."""
+    present = given.additions
     path, final = _one_by_one(magnitudes, effects, given, [], len(present))
     if final.white or out_of_time():
         return path, final

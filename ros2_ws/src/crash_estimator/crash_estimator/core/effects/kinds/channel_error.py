@@ -12,14 +12,28 @@ OFFSETS = 10
 """An offset bends the measured motion itself, from which fits start: so many are looked at, evenly over its limits."""
 
 
+DRIFTED_AFTER = 0.1
+"""s after the impact, about a crash's length: a zero that drifts has by then moved by the coefficient."""
+
+
 @dataclass(frozen=True)
 class ChannelError(Effect):
-    """How a channel differs from the true signal: recorded(t) = (1 + gain) true(t - delay) + offset."""
+    """How a channel differs from the true signal: recorded(t) = (1 + gain) true(t - delay) + offset.
+
+    Its variants, of an offset: the zero has jumped at the impact (""), or it drifts from then on ("drift").
+    """
 
     distorts: str = ""  # delay, gain or offset
 
     acts_on: ClassVar[str] = "channel"
     balances_momentum: ClassVar[bool] = True
+
+    @property
+    def variants(self):
+        return ("", "drift") if self.distorts == "offset" else ("",)
+
+    def course(self, variant, time):
+        return time / DRIFTED_AFTER if variant == "drift" else np.ones(np.shape(time))
 
     def possible_targets(self, structure, test):
         measured = [body for body in structure.bodies if not body.derived]
@@ -28,8 +42,8 @@ class ChannelError(Effect):
     def put_to_work(self, structure, test, spec):
         if spec.coefficient is not None:
             return structure  # taken out of the samples: `core.effects.channels`
-        if self.distorts == "delay":
-            raise to_be_given(structure, spec, "its coefficient, in s")
+        if self.distorts == "delay" or spec.variant:
+            raise to_be_given(structure, spec, f"its coefficient, in {self.unit}")
         k, body = next((k, b) for k, b in enumerate(structure.bodies) if spec.target in (*b.acceleration, b.force))
         scale = self.size or ROUGHLY * (self.high if np.isfinite(self.high) else 1.0)
         unit = self.unit
@@ -47,7 +61,7 @@ class ChannelError(Effect):
             elif self.distorts != "offset":
                 shown.append(body.force)
         shown += [name for body in structure.bodies if body.driven for name in body.acceleration]
-        yield from (Addition(self, name) for name in shown)
+        yield from (Addition(self, name, variant=variant) for name in shown for variant in self.variants)
 
     def coefficient_grid(self):
         if self.distorts != "offset":
