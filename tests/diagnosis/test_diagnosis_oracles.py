@@ -91,6 +91,7 @@ EVERY_EFFECT = (
     EffectSpec("quadratic_damping", "foam", 60.0),
     EffectSpec("coulomb_friction", "mount", 400.0, {"speed": 0.3}),
     EffectSpec("hysteresis", "foam", 1500.0, {"yield_crush": 0.01, "exponent": 2.0}),
+    EffectSpec("hysteresis", "foam", 1500.0, {"yield_crush": 0.01, "exponent": 1.5}, variant="dahl"),
     EffectSpec("rate_hardening", "foam", 40.0, {"exponent": 2.0}),
     EffectSpec("cubic_stiffness", "foam", 2.0e6),
     EffectSpec("clearance", "foam", 0.02),

@@ -23,6 +23,7 @@ from crash_replay.synthetic.hidden.cases import draw_case
 
 FRONTAL = ROOT / "bags" / "frontal_single.mcap"
 STANDS_STILL = Drift(False, 1e-9, "the mass of car", 0.1)
+VARIES = STANDS_STILL._replace(share=0.8)
 
 
 def left(of_peak: float, rms: float, rating: float | None = 0.9) -> Left:
@@ -47,7 +48,8 @@ MENDED = {"after": left(0.04, 0.5)}
         ({"after": left(0.009, 2.0)}, DEFAULT, "effect_missing", True),
         ({"white": True, "drift": STANDS_STILL._replace(constant=True)}, DEFAULT, "effect_missing", True),
         ({"after": left(0.19, 9.0)}, DEFAULT, "unexplained", False),  # it explains a fifth
-        ({"drift": STANDS_STILL._replace(share=0.8)}, DEFAULT, "unexplained", False),
+        ({"drift": VARIES, "by_first": 0.9}, DEFAULT, "unexplained", False),
+        ({"drift": VARIES, "by_first": 0.96}, DEFAULT, "effect_missing", False),
         ({"white": True}, DEFAULT, "unexplained", False),  # it looks like noise, and varies with time
         ({"weighed": False}, DEFAULT, "unexplained", False),
         ({"certain": False}, DEFAULT, "unexplained", False),

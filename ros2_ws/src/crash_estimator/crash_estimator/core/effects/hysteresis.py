@@ -5,6 +5,9 @@
 X is the crush in m, compression positive; c in N, never negative: the force at which it yields. The crush X_y over
 which it would come there, and how sharply (n = 1 gradual, 10 as a spring behind a dry slider), are found. Joints, foams
 and slipping contacts do so; `coulomb_friction` is its limit for a small X_y, but turns with the rate at any speed.
+
+Form `dahl` (Dahl 1968), of dry friction before it slips: dz/dX = (1 - |z|^n sgn(z dX)) / X_y, twice as stiff where the
+motion turns.
 """
 
 import numpy as np
@@ -13,11 +16,12 @@ from .effect import Shape
 from .kinds import HystereticForce
 
 
-def memory(crush: np.ndarray, start: float, yield_crush: float, exponent: float):
+def memory(crush: np.ndarray, start: float, yield_crush: float, exponent: float, form: str = ""):
     """z (g,) from `start` at the first of the crushes (g,) m, and its derivatives by the z before and by the crush."""
+    back = 1.0 if form == "dahl" else 0.0
     from .bouc_wen import trace  # the compiler takes long to import: only who needs it waits for it
 
-    return trace(np.ascontiguousarray(crush, dtype=float), float(start), float(yield_crush), float(exponent))
+    return trace(np.ascontiguousarray(crush, dtype=float), float(start), float(yield_crush), float(exponent), back)
 
 
 EFFECT = HystereticForce(
@@ -28,4 +32,5 @@ EFFECT = HystereticForce(
         "exponent": Shape("", 1.0, 10.0, (2.0,)),
     },
     memory=memory,
+    forms=("dahl",),
 )

@@ -11,6 +11,7 @@ damper never pulls carries nothing where F is negative though S is not. What z r
     dz_t = a_t dz_{t-1} + b_t (dX_t - dX_{t-1}),
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -143,12 +144,13 @@ def _law(link: Link, theta: np.ndarray) -> Law:
 
 def _remembered(term: Term, link: Link, theta, x, gate, parallel, parameters, columns) -> tuple[np.ndarray, Memory]:
     """The parallel force with c z added, and its memory; derivatives are appended."""
-    c, effect, shapes = theta[term.coefficient], term.addition.effect, _shapes(term, theta)
+    c, shapes = theta[term.coefficient], _shapes(term, theta)
+    memory = partial(term.addition.effect.memory, form=term.addition.variant)
     crush = np.concatenate([[0.0], x if link.tension else np.maximum(x, 0.0)])
-    z, kept, by_crush = (each[1:] for each in effect.memory(crush, 0.0, **shapes))
+    z, kept, by_crush = (each[1:] for each in memory(crush, 0.0, **shapes))
     parameters += [term.coefficient, *term.shapes.values()]
     columns += [gate * z]
-    columns += [gate * c * d for d in _by_shapes(term, theta, lambda **s: effect.memory(crush, 0.0, **s)[0][1:])]
+    columns += [gate * c * d for d in _by_shapes(term, theta, lambda **s: memory(crush, 0.0, **s)[0][1:])]
     follows = by_crush if link.tension else np.where(x > 0.0, by_crush, 0.0)
     return parallel + c * z, Memory(kept, follows, gate * c)
 

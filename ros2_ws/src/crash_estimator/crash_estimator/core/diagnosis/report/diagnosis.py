@@ -16,6 +16,7 @@ from ..observation.record import ObservedRecord, observe
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import free_run, noise_floor
 from ..residuals.score_test import Drift, drift_of
+from ..selection.acceptance import share_removed
 from ..selection.assumptions import SelectionPath, first_believed, select
 from ..selection.fitted_model import Model
 from ..selection.selection_step import fit_of_all
@@ -160,7 +161,9 @@ def _answer(
     weighed = final.fit.problem.noise_is_inflated or after.share_explained(before) > THRESHOLDS.all_but_folds
     certain = all(abs(one.coefficient) > one.std for one in reports)
     many = len(added) or len(reports)  # a time zero is none of the effects that may be too many
-    evidence = Evidence(many, final.white, drift, before, after, ranking, weighed, certain)
+    with_first = steps[1].before if len(steps) > 1 else final
+    by_first = share_removed(steps[0].before.residuals, with_first.residuals) if added else 0.0
+    evidence = Evidence(many, final.white, drift, before, after, ranking, weighed, certain, by_first)
     verdict = verdict_on(evidence, tolerance)
     floor = noise_floor(given.fit.layout, given.records)
     return Diagnosis(

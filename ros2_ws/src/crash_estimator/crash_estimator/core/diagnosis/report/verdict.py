@@ -23,6 +23,7 @@ class Evidence(NamedTuple):
     ranking: Sequence[Ranked]  # of the first step
     weighed: bool  # the evidence was taken in a noise as large as what is left
     certain: bool  # every coefficient that was added is beyond its standard deviation
+    by_first: float = 0.0  # share of the misfit that the first effect alone removes
 
     @property
     def noise(self) -> bool:
@@ -44,7 +45,7 @@ def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
     if evidence.noise:
         word = EFFECT_MISSING if evidence.added else ADEQUATE
         return Verdict(word if evidence.added <= THRESHOLDS.most_at_once else UNEXPLAINED, True)
-    if evidence.white or not _stands_still(evidence.drift):  # it looks like noise, and varies with time: a mimic
+    if evidence.white or not _stands_still(evidence):  # it looks like noise, and varies with time: a mimic
         return Verdict(UNEXPLAINED, False)
     if not evidence.added:
         return Verdict(ADEQUATE if within else UNEXPLAINED, within)
@@ -52,9 +53,11 @@ def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
     return Verdict(EFFECT_MISSING, within) if named else Verdict(UNEXPLAINED, False)
 
 
-def _stands_still(drift: Drift) -> bool:
-    """Most of what is left does not go along with a mass, a force or a gain that varies with time."""
-    return drift.constant or drift.share < THRESHOLDS.varying
+def _stands_still(evidence: Evidence) -> bool:
+    """Most of what is left does not go along with a mass, a force or a gain that varies with time; or it is of so
+    little weight beside what one effect explains that it may be the form of that."""
+    of_little_weight = evidence.by_first > THRESHOLDS.all_but_folds
+    return of_little_weight or evidence.drift.constant or evidence.drift.share < THRESHOLDS.varying
 
 
 def _explains(evidence: Evidence) -> bool:

@@ -15,10 +15,12 @@ from ...structure import Structure
 from ..mechanics.linearization import linearise
 from ..observation.record import ObservedRecord
 from ..output_error.gauss_newton import Fit, fit
+from ..output_error.problem import embedding, make_problem
 from ..parameterization.experiment import experiments_of
 from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
 from ..parameterization.model_terms import additions_of
 from ..residuals.residuals import Residuals, analyse
+from ..residuals.score_test import drift_of
 from ..residuals.vibration import vibrates_from
 from .acceptance import share_removed
 from .fitted_model import Model, fit_model
@@ -44,6 +46,11 @@ class SelectionPath(NamedTuple):
     as_recorded: Fit  # of the final model, in the sensors' noise
     records: Sequence[ObservedRecord]  # in the band that was compared
 
+    @property
+    def noise(self) -> bool:
+        """The final model leaves nothing else, and nothing that varies with time."""
+        return self.final.white and drift_of(self.as_recorded).constant
+
     def rank(self) -> tuple[bool, float]:
         """Of paths under different assumptions the largest is believed."""
         return self.final.white, self.as_recorded.evidence
@@ -65,7 +72,7 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
 def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
     path = _as_exact_as_needed(structure, records, effects)
     pushing = never_pulling(structure)
-    if pushing is not structure and not out_of_time() and _may_be_explained_by(pushing, path, records):
+    if pushing is not structure and not out_of_time() and _may_be_explained_by(pushing, path, path.records):
         path = max(path, _as_exact_as_needed(pushing, path.records, effects), key=SelectionPath.rank)
     return path
 
@@ -133,16 +140,19 @@ def _as_exact_as_needed(
     magnitudes, given = _as_given(structure, records, effects)
     if records[0].in_doubt:
         return _with_curves_as_fine_as_needed(magnitudes, given, effects)
-    doubted = [record.doubted() for record in records]
-    doubtful = _white_in_doubt(magnitudes, given, doubted)
-    path = None if doubtful else _with_curves_as_fine_as_needed(magnitudes, given, effects)
-    if path:
-        models = [step.before for step in path.steps[1:] if step.before is not path.final]
-        models += [] if path.final.white else [path.final]
-        if out_of_time() or not any(_white_in_doubt(magnitudes, model, doubted) for model in models):
+    doubted = magnitudes._replace(records=[record.doubted() for record in records])
+    start, path = _in_doubt(doubted, given), None
+    if not _leaves_noise(start):
+        path = _with_curves_as_fine_as_needed(magnitudes, given, effects)
+        first, *later = [step.before for step in path.steps]
+        later += [] if path.steps[-1].before is path.final else [path.final]
+        if first is not given:  # a candidate's fit has shown a better one
+            start = _in_doubt(doubted, first)
+        fewer = (_in_doubt(doubted, model) for model in later if not (model is path.final and path.noise))
+        if out_of_time() or not (_leaves_noise(start) or any(map(_leaves_noise, fewer))):
             return path
-    other = _with_curves_as_fine_as_needed(*_as_given(structure, doubted, effects), effects)
-    if path is None or (other.final.white and (not path.final.white or len(other.steps) < len(path.steps))):
+    other = _with_curves_as_fine_as_needed(doubted, start, effects)
+    if path is None or (other.noise and (not path.noise or len(other.steps) < len(path.steps))):
         return other
     return path
 
@@ -154,11 +164,23 @@ def _as_given(
     return magnitudes, fit_model(magnitudes, records, additions_of(structure, magnitudes, effects))
 
 
-def _white_in_doubt(magnitudes: Magnitudes, model: Model, doubted: Sequence[ObservedRecord]) -> bool:
-    """Whether a model leaves nothing but noise if masses and zeros may err."""
-    if model.white or model.residuals.mean_square >= THRESHOLDS.real_structure:
-        return model.white
-    return fit_model(magnitudes._replace(records=doubted), doubted, model.additions).white
+def _in_doubt(doubted: Magnitudes, model: Model) -> Model:
+    """The model where masses and zeros may err; as it is where no such error is all that it leaves."""
+    if model.residuals.mean_square >= THRESHOLDS.real_structure:
+        return model
+    problem, start = make_problem(doubted, doubted.records, model.additions), None
+    if [link.curve and len(link.curve.knots) for link in problem.layout.links] == [
+        link.curve and len(link.curve.knots) for link in model.fit.layout.links
+    ]:  # else its curves are finer, or reach elsewhere
+        theta = problem.layout.start.copy()
+        theta[embedding(model.fit.layout, problem.layout)] = model.fit.theta
+        start = problem.moved(theta, model.fit.trajectories)
+    return fit_model(doubted, doubted.records, model.additions, start)
+
+
+def _leaves_noise(model: Model) -> bool:
+    """Nothing else, and nothing that varies with time."""
+    return model.white and drift_of(model.fit).constant
 
 
 def _with_curves_as_fine_as_needed(
@@ -168,10 +190,11 @@ def _with_curves_as_fine_as_needed(
     steps, final = forward_selection(magnitudes, effects, given)
     as_recorded = in_the_sensors_noise(final, records)
     finer = measure_magnitudes(structure, records, FINER_CELLS)
-    if not out_of_time() and _wants_finer_curves(final, analyse(as_recorded), finer, len(present)):
+    mimicked = final.white and not drift_of(as_recorded).constant
+    if not out_of_time() and _wants_finer_curves(final, mimicked, analyse(as_recorded), finer, len(present)):
         finer_steps, finer_final = forward_selection(finer, effects, fit_model(finer, records, present))
         fewer = len(finer_final.additions) < len(final.additions) or not final.white
-        if finer_final.white and fewer:
+        if finer_final.white and (fewer or (mimicked and drift_of(finer_final.fit).constant)):
             steps, final = finer_steps, finer_final
             as_recorded = in_the_sensors_noise(final, records)
     steps, reported = up_to_the_least_error(steps, final, len(present))
@@ -180,22 +203,24 @@ def _with_curves_as_fine_as_needed(
     return SelectionPath(structure, steps, final, len(present), as_recorded, records)
 
 
-def _wants_finer_curves(final: Model, residuals: Residuals, finer: Magnitudes, present: int) -> bool:
+def _wants_finer_curves(final: Model, mimicked: bool, residuals: Residuals, finer: Magnitudes, present: int) -> bool:
     """Whether folds of a curve that its cells are too wide for may be what is left, or what several effects stand for.
 
-    residuals: of the final model in the sensors' noise.
+    mimicked: what the final model leaves varies with time, though it is white; residuals: its in the sensors' noise.
     """
 
-    def refined(additions: Sequence[Addition]) -> Residuals:
-        return fit_model(finer, finer.records, additions).residuals
+    def refined(additions: Sequence[Addition]) -> Model:
+        return fit_model(finer, finer.records, additions)
 
     given, found = final.additions[:present], final.additions[present:]
     if len(found) > 1 and any(refined((*given, one)).white for one in found):
         return True
+    if mimicked:
+        return drift_of(refined(final.additions).fit).constant
     if final.white or residuals.mean_square >= THRESHOLDS.near_floor:
         return False
     sharper = refined(final.additions)
-    return sharper.white or share_removed(residuals, sharper) > THRESHOLDS.least_share
+    return sharper.white or share_removed(residuals, sharper.residuals) > THRESHOLDS.least_share
 
 
 def in_the_sensors_noise(model: Model, records: Sequence[ObservedRecord]) -> Fit:

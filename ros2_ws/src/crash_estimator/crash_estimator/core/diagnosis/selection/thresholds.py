@@ -36,8 +36,10 @@ class Thresholds(NamedTuple):
     """Of what the model before it leaves above the floor: an addition that removes less of it, and still leaves more
     than noise, is no explanation."""
     all_but_folds: float = 0.95
-    """Share that two of a kind must remove, where they leave more than noise: the rest may be folds of the curves. And
-    share from which the first effects are believed though more were added: what is left is of little weight."""
+    """Share that two of a kind must remove, where they leave more than noise: the rest may be folds of the curves.
+    Share from which the first effects are believed though more were added; and from which the first one alone is,
+    though what is left varies with time. Of 11 development cases whose law is written another way the right one removed
+    0.90 and more, in 9 of them more than this; of 20 outside the vocabulary 2 did, both of a rate effect."""
 
     # What is said, of what leaves more than noise
     most_at_once: int = 2
@@ -52,8 +54,9 @@ class Thresholds(NamedTuple):
     # How much is tried: whole numbers that bound the work. None of them was varied by itself; a larger one costs time
     most_steps: int = 4
     """Additions: what takes more is not told from a free curve that follows anything."""
-    shortlist: int = 4
-    """Candidates from each of the two screenings that are fitted in full ..."""
+    shortlist: int = 5
+    """Candidates from each of the two screenings that are fitted in full: with four the forms of dry friction left no
+    place for the engine of NHTSA 10146 ..."""
     long_list: int = 10
     """... and where none of them leaves white noise."""
     most_hosts: int = 3

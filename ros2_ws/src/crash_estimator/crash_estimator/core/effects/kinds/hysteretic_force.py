@@ -1,7 +1,7 @@
 """A force in parallel to an element's own that hangs on the way its crush has gone."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar
 
@@ -17,23 +17,30 @@ from .element_force import HALF, on_element
 class HystereticForce(Effect):
     """A force c z in parallel to an element's own, compression positive; z, within -1 and 1, is its memory.
 
-    memory(crush (g,) m, start, **shape constants) -> z (g,) from `start` at the first crush on, dz_t/dz_{t-1} (g,) and
-    dz_t/dX_t = - dz_t/dX_{t-1} (g,) 1/m. While the element is apart its crush counts as 0: the memory stays.
+    memory(crush (g,) m, start, form=variant, **shape constants) -> z (g,) from `start` at the first crush on,
+    dz_t/dz_{t-1} (g,) and dz_t/dX_t = - dz_t/dX_{t-1} (g,) 1/m. While the element is apart its crush counts as 0: the
+    memory stays.
     """
 
     memory: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
+    forms: tuple[str, ...] = ()  # beside the usual one
 
     remembers: ClassVar[bool] = True
+
+    @property
+    def variants(self):
+        return ("", *self.forms)
 
     def put_to_work(self, structure, test, spec):
         k = element_index(structure, spec.target)
         scale = ROUGHLY * structure.reduced_mass(k) * CONTACT_FREQUENCY**2 * TYPICAL_CRUSH
-        memory = partial(self.memory, **spec.shape)
+        memory = partial(self.memory, form=spec.variant, **spec.shape)
         return with_action(structure, spec, self.unit, "memory", k, coefficient_of(spec, self), scale, force=memory)
 
     def candidates(self, structure, magnitudes):
         for element in magnitudes.crushed_elements():
-            yield from on_element(self, magnitudes, element.name)
+            for addition in on_element(self, magnitudes, element.name):
+                yield from (replace(addition, variant=form) for form in self.variants)
 
     def prior_std(self, magnitudes, addition):
         return HALF * magnitudes.force[magnitudes.element(addition.target)]
