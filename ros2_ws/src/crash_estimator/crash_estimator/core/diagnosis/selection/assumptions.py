@@ -144,13 +144,12 @@ def _as_exact_as_needed(
     start, path = _in_doubt(doubted, given), None
     if not _leaves_noise(start):
         path = _with_curves_as_fine_as_needed(magnitudes, given, effects)
-        first, *later = [step.before for step in path.steps]
-        later += [] if path.steps[-1].before is path.final else [path.final]
-        if first is not given:  # a candidate's fit has shown a better one
-            start = _in_doubt(doubted, first)
-        fewer = (_in_doubt(doubted, model) for model in later if not (model is path.final and path.noise))
-        if out_of_time() or not (_leaves_noise(start) or any(map(_leaves_noise, fewer))):
+        models = [step.before for step in path.steps if step.before is not given]
+        models += [] if path.steps[-1].before is path.final else [path.final]
+        fewer = (_in_doubt(doubted, model) for model in models if not (model is path.final and path.noise))
+        if out_of_time() or not any(map(_leaves_noise, fewer)):
             return path
+        start = _in_doubt(doubted, path.steps[0].before)  # a candidate's fit may have shown a better one
     other = _with_curves_as_fine_as_needed(doubted, start, effects)
     if path is None or (other.noise and (not path.noise or len(other.steps) < len(path.steps))):
         return other
@@ -165,9 +164,7 @@ def _as_given(
 
 
 def _in_doubt(doubted: Magnitudes, model: Model) -> Model:
-    """The model where masses and zeros may err; as it is where no such error is all that it leaves."""
-    if model.residuals.mean_square >= THRESHOLDS.real_structure:
-        return model
+    """The model where masses and zeros may err."""
     problem, start = make_problem(doubted, doubted.records, model.additions), None
     if [link.curve and len(link.curve.knots) for link in problem.layout.links] == [
         link.curve and len(link.curve.knots) for link in model.fit.layout.links
