@@ -36,6 +36,7 @@ class Ranked:
     confounded_with: tuple[str, ...]  # "effect on target"
     shape: dict[str, float] = field(default_factory=dict)  # shape constants found
     fitted: bool = True  # False: screened only; its evidence is an estimate
+    form: str = ""  # in which the effect is written, of those that it has; "": the usual one
 
     @property
     def name(self) -> str:
@@ -60,6 +61,12 @@ class StepReport:
     residual_rms: dict
     free_run_rms: dict
     force_explained: dict[str, dict]  # per measured force: share explained by the inertias, before and after
+    form: str = ""  # as of a `Ranked`
+
+    @property
+    def name(self) -> str:
+        form = f" ({self.form})" if self.form else ""
+        return f"{self.effect}{form} on {self.target}"
 
     def as_json(self) -> dict:
         return vars(self)
@@ -120,7 +127,7 @@ def _ranked(one: CandidateFit, before: Model, shown: list[CandidateFit]) -> Rank
     identifiable = not rivals and bool(std <= abs(value))  # whose sigma exceeds it may as well be nothing
     return Ranked(
         effect, target, value, std, addition.effect.unit, float(one.gain), explained, identifiable, rivals, shape,
-        one.fit is not None,
+        one.fit is not None, addition.variant,
     )  # fmt: skip
 
 
@@ -147,6 +154,7 @@ def step_of(
         },
         free_run_rms={"before": free_run_rms[0], "after": free_run_rms[1]},
         force_explained=_force_explained(step.before.fit, changed),
+        form=best.addition.variant,
     )  # fmt: skip
 
 

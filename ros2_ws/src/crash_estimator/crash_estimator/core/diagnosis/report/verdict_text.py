@@ -82,7 +82,7 @@ def _unexplained(evidence: Evidence, steps, first: Model, final: Model, floor: f
 
 
 def _names(steps: Sequence[StepReport]) -> str:
-    return ", ".join(f"{step.effect} on {step.target}" for step in steps)
+    return ", ".join(step.name for step in steps)
 
 
 def _size(first: Model, final: Model, floor: float) -> str:
