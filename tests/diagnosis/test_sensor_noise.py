@@ -35,6 +35,20 @@ def test_what_is_missing_is_named_with_sensors_as_they_are(name):
     assert right(judge(case_of(name)))
 
 
+@pytest.mark.parametrize("name", ["sled/channel.delay/1g/clean/71400029"])
+def test_what_a_coarse_curve_leaves_is_no_mimic(name):
+    """It is white, and goes along with a force that varies with time, until the curve is finer."""
+    assert right(judge(case_of(name)))
+
+
+def test_a_zero_that_drifts_is_named_with_its_form():
+    it = drawn(case_of("sled/channel.drift/1g/clean/71400066"))
+    found = diagnose(ModelFile.model_validate(yaml.safe_load(it.model_text)).structure(), it.recordings)
+    assert found.verdict == "effect_missing" and "channel_offset (drift) on sled_ax" in found.text
+    assert [step["form"] for step in found.as_json()["steps"]] == ["drift"]
+    assert found.structure.effects[-1].variant == "drift"
+
+
 def test_what_rings_is_told():
     it = drawn(case_of("cab/nothing/2g/ringing/71100243"))
     structure = ModelFile.model_validate(yaml.safe_load(it.model_text)).structure()

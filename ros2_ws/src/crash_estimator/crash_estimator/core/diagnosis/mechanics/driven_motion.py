@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects.effect import Addition
-from ..observation.record import DRIVEN_MODES, ObservedRecord
+from ..observation.grid import DRIVEN_MODES
+from ..observation.record import ObservedRecord
 from ..observation.trajectory import Trajectory, integrate
 from ..parameterization.experiment import Experiment
 from ..parameterization.layout import FREE, Layout

@@ -5,7 +5,8 @@ A mean over a bin is a sample with less noise, at the bin's centre; what is fast
 
 import numpy as np
 
-from .record import ObservedRecord, Signal, cosines_of, on_grid
+from .grid import cosines_of, on_grid
+from .record import ObservedRecord, Signal
 
 STEP = 5e-4
 """s: the linear-acceleration step's phase error, (omega dt)^2 / 24, is 4e-4 for the stiffest contact, 200 rad/s."""

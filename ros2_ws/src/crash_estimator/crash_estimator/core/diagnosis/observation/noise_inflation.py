@@ -12,7 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.fft import dct
 
-from .record import ObservedRecord, bins_of
+from .grid import bins_of
+from .record import ObservedRecord
 
 CFC = 60
 """The band in which forces and inertias of a structure that rings are compared (SAE J211: its motion as a whole)."""

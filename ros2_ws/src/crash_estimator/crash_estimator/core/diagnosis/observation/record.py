@@ -17,19 +17,13 @@ from ...kinematics import Kinematics
 from ...noise_spectrum import NoiseSpectrum
 from ...sensor_noise import sensor_noise
 from ...structure import ModelError, Structure
+from .grid import bins_of, cosines_of, grid_of, on_grid
 from .pace import longest_step
 from .tracked_motion import tracked_acceleration
 from .whitening import filtered, weights
 
-BIN = 4e-4
-"""s: length of the bins that outputs are averaged over; they keep what is below 1250 Hz, and a crash model says nothing
-of what is above 1 kHz (SAE J211: CFC 600 is its finest class for structures)."""
-
 FEWEST_SAMPLES = 20
 """After the impact: 2 ms at 10 kHz, five bins, in which no curve has a second slope yet."""
-
-DRIVEN_MODES = 6
-"""Cosines of a driven channel's noise beside its mean: integrated twice, what is faster moves nothing."""
 
 
 class Signal(NamedTuple):
@@ -185,7 +179,7 @@ def observe(structure: Structure, recording: Recording) -> ObservedRecord:
             f"test {recording.test.id} has {np.count_nonzero(after)} samples after the impact, too few to fit"
         )
     sample_time = recording.time_ns[after] * 1e-9
-    time, at = _grid(sample_time, longest_step(structure, recording))
+    time, at = grid_of(sample_time, longest_step(structure, recording))
     outputs = outputs_of(structure)
     names = [name for _, name, _ in structure.channels()]
     names += [c.name for c in recording.test.channels if c.quantity == "acceleration"]
@@ -228,28 +222,6 @@ def observe(structure: Structure, recording: Recording) -> ObservedRecord:
     return record.in_band(np.inf)
 
 
-def cosines_of(time: np.ndarray) -> np.ndarray:
-    """`cosines` of an ObservedRecord on a grid of instants."""
-    return np.cos(np.outer(np.pi * time / time[-1], np.arange(DRIVEN_MODES + 1)))
-
-
-def _grid(sample_time: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Instants from time zero on, with every sample among them -> (g,) s, (n,) index of each sample."""
-    stops = sample_time if sample_time[0] < 1e-9 else np.concatenate([[0.0], sample_time])
-    steps = np.maximum(np.ceil(np.diff(stops) / longest - 1e-6).astype(int), 1)
-    index = np.concatenate([[0], np.cumsum(steps)])
-    within = np.arange(index[-1]) - np.repeat(index[:-1], steps)
-    time = within * np.repeat(np.diff(stops) / steps, steps) + np.repeat(stops[:-1], steps)
-    return np.append(time, stops[-1]), index[len(stops) - len(sample_time) :]
-
-
-def on_grid(time: np.ndarray, at: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """`on_grid` of an ObservedRecord."""
-    found = np.zeros((len(time), measured.shape[1]))
-    found[at] = np.nan_to_num(measured)
-    return found
-
-
 def _signal(recording: Recording, name: str, grid: np.ndarray) -> Signal:
     values = recording.column(name)
     valid = np.isfinite(values)
@@ -278,26 +250,3 @@ def _offset_std(signal: Signal, output: Output) -> float:
 
 def _raw(recording: Recording, name: str, signal: Signal) -> np.ndarray:
     return np.where(np.isfinite(recording.column(name)), signal.values, np.nan)
-
-
-def bins_of(
-    time: np.ndarray, at: np.ndarray, measured: np.ndarray, length: float = BIN, mixed: float = 0.0
-) -> tuple[np.ndarray, np.ndarray, int]:
-    """`bin`, `valid` and `bins` of an ObservedRecord whose bins are `length` s long.
-
-    mixed: s from the impact on in which a filter shows what was before it as well; they are not compared.
-    """
-    period = float(np.median(np.diff(time[at])))
-    per_bin = max(1, int(round(length / period)))
-    bin_ = np.full(len(time), -1)
-    bin_[at] = np.arange(len(at)) // per_bin
-    bins = int(bin_.max()) + 1
-    ok = np.isfinite(measured).astype(float)
-    ok[time[at] < max(mixed, 1e-9)] = (
-        0.0  # at the very impact forces may jump: on which side this sample lies is chance
-    )
-    count = np.zeros((bins, measured.shape[1]))
-    np.add.at(count, bin_[at], ok)
-    valid = np.zeros((len(time), measured.shape[1]))
-    valid[at] = ok / np.sqrt(np.maximum(count[bin_[at]], 1.0))
-    return bin_, valid, bins

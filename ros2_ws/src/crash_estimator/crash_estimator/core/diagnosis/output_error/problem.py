@@ -7,7 +7,8 @@ import numpy as np
 
 from ...effects.effect import Addition
 from ..mechanics.driven_motion import measured_motion, motion_of
-from ..observation.record import DRIVEN_MODES, ObservedRecord
+from ..observation.grid import DRIVEN_MODES
+from ..observation.record import ObservedRecord
 from ..observation.trajectory import Trajectory
 from ..parameterization.experiment import Experiment, experiments_of
 from ..parameterization.layout import Layout, make_layout
@@ -51,6 +52,12 @@ class OutputErrorProblem(NamedTuple):
         """Parameters, and the motions in which free bodies accelerate as in the trajectories."""
         pairs = zip(self.experiments, trajectories, strict=True)
         return Point(theta, [motion_of(experiment, theta, trajectory.a) for experiment, trajectory in pairs])
+
+    def widened(self, narrow: Layout, theta: np.ndarray) -> np.ndarray:
+        """Parameters (p,) of a problem with fewer of them, the others as they start."""
+        wide = self.layout.start.copy()
+        wide[embedding(narrow, self.layout)] = theta
+        return wide
 
     def narrowed(self, wide: Layout, point: Point) -> Point:
         """A point of a problem with more additions, without those that this one has not."""

@@ -6,6 +6,9 @@ import numpy as np
 
 from .free_curve import Curve, prior_precision
 
+LEAST_STD = 1e-9
+"""SI: what is known exactly, as the zero of a channel without noise, keeps a precision that can be computed with."""
+
 
 class Prior(NamedTuple):
     mean: np.ndarray  # (p,)
@@ -29,7 +32,7 @@ class Builder:
     def add(self, name: str, start: float, std: float, mean=0.0, low=-np.inf, high=np.inf) -> int:
         for column, item in zip(
             (self.names, self.start, self.std, self.mean, self.low, self.high),
-            (name, start, std, mean, low, high),
+            (name, start, max(std, LEAST_STD), mean, low, high),
         ):
             column.append(item)
         return len(self.start) - 1

@@ -15,7 +15,7 @@ from ...structure import Structure
 from ..mechanics.linearization import linearise
 from ..observation.record import ObservedRecord
 from ..output_error.gauss_newton import Fit, fit
-from ..output_error.problem import embedding, make_problem
+from ..output_error.problem import make_problem
 from ..parameterization.experiment import experiments_of
 from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
 from ..parameterization.model_terms import additions_of
@@ -169,8 +169,7 @@ def _in_doubt(doubted: Magnitudes, model: Model) -> Model:
     if [link.curve and len(link.curve.knots) for link in problem.layout.links] == [
         link.curve and len(link.curve.knots) for link in model.fit.layout.links
     ]:  # else its curves are finer, or reach elsewhere
-        theta = problem.layout.start.copy()
-        theta[embedding(model.fit.layout, problem.layout)] = model.fit.theta
+        theta = problem.widened(model.fit.layout, model.fit.theta)
         start = problem.moved(theta, model.fit.trajectories)
     return fit_model(doubted, doubted.records, model.additions, start)
 

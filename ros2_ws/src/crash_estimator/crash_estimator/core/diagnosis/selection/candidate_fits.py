@@ -14,7 +14,7 @@ from ..output_error.continuation import (
     Schedule,
 )
 from ..output_error.gauss_newton import MOST_ITERATIONS, Fit, equation_error_left, fit
-from ..output_error.problem import OutputErrorProblem, Point, embedding, make_problem
+from ..output_error.problem import OutputErrorProblem, Point, make_problem
 from ..output_error.profile_likelihood import closer, profile
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
@@ -210,8 +210,7 @@ class _Search:
 
 def start_from(model: Model, problem: OutputErrorProblem, addition: Addition, screened: Screened | None) -> Point:
     """Where the model without the addition has ended, with the coefficient that its screening estimates."""
-    theta = problem.layout.start.copy()
-    theta[embedding(model.fit.layout, problem.layout)] = model.fit.theta
+    theta = problem.widened(model.fit.layout, model.fit.theta)
     if screened and not addition.effect.changes_law:
         theta[problem.layout.term(addition).coefficient] = screened.coefficient
     return problem.moved(theta, model.fit.trajectories)

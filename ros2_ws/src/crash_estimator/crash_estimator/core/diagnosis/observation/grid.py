@@ -1,0 +1,55 @@
+"""The instants of a record, and the bins that its outputs are compared in."""
+
+import numpy as np
+
+BIN = 4e-4
+"""s: length of the bins that outputs are averaged over; they keep what is below 1250 Hz, and a crash model says nothing
+of what is above 1 kHz (SAE J211: CFC 600 is its finest class for structures)."""
+
+DRIVEN_MODES = 6
+"""Cosines of a driven channel's noise beside its mean: integrated twice, what is faster moves nothing."""
+
+
+def grid_of(sample_time: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Instants from time zero on, with every sample among them -> (g,) s, (n,) index of each sample."""
+    stops = sample_time if sample_time[0] < 1e-9 else np.concatenate([[0.0], sample_time])
+    steps = np.maximum(np.ceil(np.diff(stops) / longest - 1e-6).astype(int), 1)
+    index = np.concatenate([[0], np.cumsum(steps)])
+    within = np.arange(index[-1]) - np.repeat(index[:-1], steps)
+    time = within * np.repeat(np.diff(stops) / steps, steps) + np.repeat(stops[:-1], steps)
+    return np.append(time, stops[-1]), index[len(stops) - len(sample_time) :]
+
+
+def on_grid(time: np.ndarray, at: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """`on_grid` of an ObservedRecord."""
+    found = np.zeros((len(time), measured.shape[1]))
+    found[at] = np.nan_to_num(measured)
+    return found
+
+
+def cosines_of(time: np.ndarray) -> np.ndarray:
+    """`cosines` of an ObservedRecord on a grid of instants."""
+    return np.cos(np.outer(np.pi * time / time[-1], np.arange(DRIVEN_MODES + 1)))
+
+
+def bins_of(
+    time: np.ndarray, at: np.ndarray, measured: np.ndarray, length: float = BIN, mixed: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """`bin`, `valid` and `bins` of an ObservedRecord whose bins are `length` s long.
+
+    mixed: s from the impact on in which a filter shows what was before it as well; they are not compared.
+    """
+    period = float(np.median(np.diff(time[at])))
+    per_bin = max(1, int(round(length / period)))
+    bin_ = np.full(len(time), -1)
+    bin_[at] = np.arange(len(at)) // per_bin
+    bins = int(bin_.max()) + 1
+    ok = np.isfinite(measured).astype(float)
+    ok[time[at] < max(mixed, 1e-9)] = (
+        0.0  # at the very impact forces may jump: on which side this sample lies is chance
+    )
+    count = np.zeros((bins, measured.shape[1]))
+    np.add.at(count, bin_[at], ok)
+    valid = np.zeros((len(time), measured.shape[1]))
+    valid[at] = ok / np.sqrt(np.maximum(count[bin_[at]], 1.0))
+    return bin_, valid, bins
