@@ -10,6 +10,7 @@ from crash_msgs.msg import ParametersBlock, ResidualsBlock
 from crash_msgs.srv import GetEstimates
 from helpers_replay import Listener, OfTheTest, environment
 from helpers_waiting import PATIENCE
+from mcap.exceptions import EndOfFile
 from mcap.reader import make_reader
 
 from crash_replay.attending import Attending, Progress
@@ -19,6 +20,14 @@ from crash_replay.qos import STREAM
 def messages(file: Path) -> Counter:
     with file.open("rb") as stream:
         return Counter(channel.topic for _, channel, _ in make_reader(stream).iter_messages())
+
+
+def messages_so_far(file: Path) -> Counter:
+    """Of a recording that has just begun: no file, or one without its first bytes, holds none."""
+    try:
+        return messages(file)
+    except (FileNotFoundError, EndOfFile):
+        return Counter()
 
 
 def says_of_itself(file: Path) -> dict[str, str]:

@@ -4,7 +4,7 @@ import signal
 import time
 
 import pytest
-from helpers_record import Record, messages
+from helpers_record import Record, messages, messages_so_far
 from helpers_replay import DOMAIN, Replay, environment, some_recording, wait_until
 from helpers_waiting import PATIENCE
 from mcap.reader import make_reader
@@ -18,7 +18,7 @@ def test_a_signal_ends_it_in_time_with_a_whole_file(bag, tmp_path, number):
     file = tmp_path / "e.mcap"
     with Record(file, wait_for=0) as record:
         with Replay(bag, rate=0.01, wait_for=1, wait_timeout=PATIENCE):
-            wait_until(lambda: file.exists() and messages(file)["/samples"] > 5)
+            wait_until(lambda: messages_so_far(file)["/samples"] > 5)
             began = time.monotonic()
             status, _, errors = record.end(number)
             assert time.monotonic() - began < 5.0
@@ -43,7 +43,7 @@ def test_stopped_for_longer_than_the_middleware_waits_it_asks_for_what_it_missed
     bag, file = write_bag(recording, tmp_path / "b.mcap"), tmp_path / "e.mcap"
     with Record(file, wait_for=0) as record:
         with Replay(bag, rate=0.1, wait_for=1, wait_timeout=PATIENCE) as replay:
-            wait_until(lambda: file.exists() and messages(file)["/samples"] > 100)
+            wait_until(lambda: messages_so_far(file)["/samples"] > 100)
             record.process.send_signal(signal.SIGSTOP)
             time.sleep(9.0)
             before = messages(file)["/samples"]
