@@ -75,9 +75,7 @@ def follow(estimator: AnyEstimator, state: Any, rows: Rows) -> tuple[Any, Column
 
     However the samples are shared out to calls, states and estimates are the same to the last bit.
     """
-    from ..core.compiled.estimator import CompiledEstimator  # late, see above
-
-    if isinstance(estimator, CompiledEstimator):
+    if hasattr(estimator, "follow"):  # a compiled one takes them all at once
         return _follow_compiled(estimator, state, rows)
     estimates: list[Estimate] = []
     for sample in rows.samples():
@@ -112,7 +110,7 @@ def _follow_compiled(
 ) -> tuple["CompiledState", Columns]:
     after, table = estimator.follow(state, rows.time_ns, rows.values)
     value = table[:, estimator.columns["parameters"]]
-    if not isfinite(value[-1].sum()):  # what is not finite once stays so
+    if not isfinite(sum(value[-1].tolist())):  # what is not finite once stays so
         good = int(np.argmin(np.isfinite(value).all(axis=1)))
         done = _columns(estimator, state, rows.first(good), table[:good]) if good else None
         number, time_ns = rows.number + good, int(rows.time_ns[good])
@@ -123,7 +121,7 @@ def _follow_compiled(
 def _columns(estimator: "CompiledEstimator", state: "CompiledState", rows: Rows, table: np.ndarray) -> Columns:
     events = [
         (k, event)
-        for k in np.flatnonzero(table[:, estimator.columns["news"]]).tolist()
+        for k in table[:, estimator.columns["news"]].nonzero()[0].tolist()
         for event in estimator.events(table[k], table[k - 1] if k else state.last_row, int(rows.time_ns[k]))
     ]
     return Columns(rows.number, rows.time_ns, Parts(table, estimator.columns), events, Again(estimator, state, rows))
