@@ -95,11 +95,13 @@ EVERY_EFFECT = (
     EffectSpec("rate_hardening", "foam", 40.0, {"exponent": 2.0}),
     EffectSpec("cubic_stiffness", "foam", 2.0e6),
     EffectSpec("clearance", "foam", 0.02),
+    EffectSpec("clearance", "mount", 0.005, variant="play"),
     EffectSpec("bottoming_out", "foam", 8.0e4, {"stop": 0.08}),
     EffectSpec("plastic_unloading", "foam", 2.5e5),
     EffectSpec("load_path", "striker-wall", 1.0e4),
     EffectSpec("added_mass", "plate", 8.0),
     EffectSpec("constant_force", "striker", 900.0),
+    EffectSpec("constant_force", "striker", 900.0, {"rise": 0.011}, variant="rising"),
     EffectSpec("unmodelled_body", "box_ax", 6.0, host="plate"),
     EffectSpec("channel_delay", "plate_ax", 2.5e-4),
     EffectSpec("channel_gain", "plate_ax", 0.04),
@@ -135,14 +137,43 @@ def test_the_simulation_is_that_of_an_ode_solver(recording):
     assert_allclose(found[1:], true[1:], atol=2e-3 * np.abs(true).max(axis=0).min(), rtol=2e-3)
 
 
+CUBIC, STOP = EffectSpec("cubic_stiffness", "foam", 2.0e6), EffectSpec("bottoming_out", "foam", 8.0e4, {"stop": 0.08})
+ON_A_LINE = [
+    *((effect, what) for effect in (CUBIC, STOP) for what in ("springs", "all")),
+    *((replace(effect, variant="in_curve"), what) for effect in (CUBIC, STOP) for what in ("nothing", "all")),
+    (EVERY_EFFECT[3], "all"),
+]
+"""Effects on a foam that unloads along a line of its own, and what acts on where it is spent."""
+
+
+def on_a_line(effect: EffectSpec, what: str) -> Structure:
+    """The striker thrown back from the wall itself, by a foam that comes back over a third of its crush."""
+    model = structure(effect)
+    foam = replace(model.elements[0], between=("striker", "wall"), unloading=4.0e5, acts_when_spent=what)
+    return replace(model, bodies=(model.bodies[0], model.bodies[2]), elements=(foam,))
+
+
+def shown(what) -> str | None:
+    return what.type + what.variant if isinstance(what, EffectSpec) else None
+
+
 NEAR = dict.fromkeys(EFFECTS, 0.03) | {"rate_hardening": 0.1}
 """Share of the derivative's norm: where a contact opens within a step, and, for the power below 1 of rate hardening,
 where the rate passes through zero: its slope there is infinite, and a mean over 2 mm/s stands for it."""
 
 
-@pytest.mark.parametrize("effect", EVERY_EFFECT, ids=lambda effect: effect.type + effect.variant)
+@pytest.mark.parametrize("effect", EVERY_EFFECT, ids=shown)
 def test_the_derivatives_of_the_outputs_are_their_finite_differences(effect, recording):
-    problem, point = problem_of(structure(effect), recording)
+    assert_derivatives_agree(structure(effect), recording, NEAR[effect.type])
+
+
+@pytest.mark.parametrize("effect, what", ON_A_LINE, ids=shown)
+def test_so_they_are_where_the_spring_is_spent(effect, what, recording):
+    assert_derivatives_agree(on_a_line(effect, what), recording, NEAR[effect.type])
+
+
+def assert_derivatives_agree(model: Structure, recording: Recording, near: float) -> None:
+    problem, point = problem_of(model, recording)
     (experiment,) = problem.experiments
     equations = linearise(experiment, point.theta, point.trajectories[0])
     by_equations = whitened(experiment, point.theta, point.trajectories[0], equations)[:, :, 1:]
@@ -159,19 +190,34 @@ def test_the_derivatives_of_the_outputs_are_their_finite_differences(effect, rec
         expected = binned(record, equations.sampling.weight * slope)
         found = by_equations[:, :, list(equations.columns).index(parameter)]
         assert np.linalg.norm(expected) > 0.0
-        assert np.linalg.norm(found - expected) < NEAR[effect.type] * np.linalg.norm(expected)
+        assert np.linalg.norm(found - expected) < near * np.linalg.norm(expected), problem.layout.names[parameter]
 
 
 IN_BOTH_FREE_RUNS = [effect for effect in EVERY_EFFECT if not effect.type.startswith("channel_")]
 
 
 @pytest.mark.parametrize("pulls", [True, False])
-@pytest.mark.parametrize("effect", [None, *IN_BOTH_FREE_RUNS], ids=lambda effect: effect.type if effect else "none")
+@pytest.mark.parametrize("effect", [None, *IN_BOTH_FREE_RUNS], ids=lambda effect: shown(effect) or "none")
 def test_the_two_free_runs_agree(effect, pulls, recording):
     """The diagnosis's simulation and the estimators' free run, of one model with the same constants."""
     model = structure(*([effect] if effect else []))
     foam = replace(model.elements[0], damper_pulls=pulls)
-    model = replace(model, elements=(foam, model.elements[1]))
+    assert_free_runs_agree(replace(model, elements=(foam, model.elements[1])), recording)
+
+
+@pytest.mark.parametrize("effect, what", ON_A_LINE, ids=shown)
+def test_so_they_do_where_the_spring_is_spent(effect, what, recording):
+    assert_free_runs_agree(on_a_line(effect, what), recording)
+
+
+def test_what_acts_where_the_spring_is_spent_makes_a_difference(recording):
+    """Else the two tests above would say nothing."""
+    found = [outputs(*problem_of(on_a_line(CUBIC, what), recording)) for what in ("nothing", "springs", "all")]
+    for one, other in zip(found, found[1:], strict=False):
+        assert np.abs(one - other).max() > 0.02 * np.abs(one).max()
+
+
+def assert_free_runs_agree(model: Structure, recording: Recording) -> None:
     one = outputs(*problem_of(model, recording))
     estimator = make_estimator(model, recording.test, "rls")
     other = free_run(applied(model, recording.test), estimator.description, run(estimator, recording.samples()))

@@ -126,6 +126,7 @@ class ElementPart(Part):
     damping: CoefficientPart = CoefficientPart(value=0.0)
     tension: Literal["none", "both"] = "both"
     damper_pulls: StrictBool = True  # with `tension: none`: until the spring is spent
+    acts_when_spent: Literal["nothing", "springs", "all"] = "nothing"  # beside a spring that is, on its line
     unloading: Positive | CoefficientPart | None = None  # N/m; or {estimate: true, initial: ...}
     crush_terms: dict[int, CoefficientPart] = {}  # power of the crush, 2 or more -> N/m^power
     rate_terms: dict[int, CoefficientPart] = {}  # power of the rate, 2 or more -> N (s/m)^power
@@ -157,6 +158,7 @@ class ElementPart(Part):
             damping=self.damping.coefficient(),
             tension=self.tension != "none",
             damper_pulls=self.damper_pulls,
+            acts_when_spent=self.acts_when_spent,
             unloading=self.unloading if isinstance(self.unloading, float) else None,
             displacement=self.displacement,
             velocity=self.velocity,

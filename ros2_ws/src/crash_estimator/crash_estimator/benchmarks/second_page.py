@@ -36,8 +36,8 @@ that carries less than 15 % of the largest force, and an effect of which less th
 noise are left, over both recordings, when the model's stiffnesses have taken what they can to first order. This is
 decided by the simulated physics alone.
 
-The judging seeds start at {SEEDS:,}. On those from {DEVELOPMENT:,} on, of which {LOOKED_AT} cases were looked at, the
-simulator was made; they may be tuned on.""".replace(",0", " 0")
+The judging seeds start at {SEEDS:,}; nobody had looked at them before. On others, of which {LOOKED_AT} cases were
+looked at, the simulator was made and the search tuned; those from {DEVELOPMENT:,} on may be tuned on.""".replace(",0", " 0")
 
 
 class Judged(NamedTuple):

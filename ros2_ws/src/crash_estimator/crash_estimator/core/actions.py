@@ -14,6 +14,8 @@ The last three are not linear. They are taken linear about the latest theta: for
     h(theta) = h(theta_0) + H (theta - theta_0),    gradient H,  known h(theta_0) - H theta_0
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .contact import SpringLaw
@@ -40,6 +42,8 @@ class Actions:
         self.value = np.array([0.0 if a.coefficient.estimated else a.coefficient.value for a in self.actions])
         self.moves = [bool(body.acceleration) for body in structure.bodies]
         self.of_channels = [j for j, a in enumerate(self.actions) if a.kind in ("gain", "offset")]
+        self.outlasts = [a.element >= 0 and a.outlasts(structure.elements[a.element]) for a in self.actions]
+        self.unloads = np.array([element.unloads for element in structure.elements], dtype=bool)
         self.measured_crush = np.array([bool(element.displacement) for element in structure.elements], dtype=bool)
 
     def corrected(self, motion: Motion, theta: np.ndarray, start: tuple[np.ndarray, np.ndarray]) -> Motion:
@@ -69,18 +73,28 @@ class Actions:
             displacement=x, velocity=v, acceleration=a, crush=crush, rate=rate, displacement_by=by_x, velocity_by=by_v
         )
 
+    def inside(self, theta: np.ndarray, motion: Motion, peak: np.ndarray) -> np.ndarray | float:
+        """(e,) N that actions add to the springs' own curves; peak (e,) m before this sample."""
+        if not any(action.in_curve for action in self.actions):
+            return 0.0
+        at = np.where(self.unloads, np.maximum(peak, motion.crush), motion.crush)
+        c = theta[self.first :]
+        return np.array([in_curve(self.actions, c, k, at[[k]])[0] for k in range(len(at))])
+
     def forces(self, motion: Motion, law: SpringLaw, static: np.ndarray) -> np.ndarray:
         """(e, n) N: what each of n actions adds to each element's force for one unit; static (e,) N of the springs."""
         per_unit = np.zeros((len(self.ends), len(self.actions)))
         for j, action in enumerate(self.actions):
             k = action.at
+            acts = action.element >= 0 and (law.crushed if self.outlasts[j] else law.carries)[k]
             if action.kind == "factor":
                 per_unit[k, j] = static[k] * action.force(motion.rate[[k]])[0]
-            elif action.kind == "memory" and law.carries[k]:
+            elif action.kind == "memory" and acts:
                 per_unit[k, j] = law.memory[j]
-            elif action.kind == "element" and law.carries[k]:
+            elif action.kind == "element" and acts:
+                crush = law.peak[k] if action.in_curve and law.on_line[k] else motion.crush[k]
                 here = ElementMotion(
-                    *(np.array([x]) for x in (motion.time, motion.crush[k], motion.rate[k], law.peak[k], static[k]))
+                    *(np.array([x]) for x in (motion.time, crush, motion.rate[k], law.peak[k], static[k]))
                 )
                 per_unit[k, j] = action.force(here)[0]
         return per_unit
@@ -185,23 +199,36 @@ def coefficients(structure: Structure, description: Description, last: Estimate)
 
 
 def beside_the_springs(
-    structure: Structure, c: np.ndarray, element: int, motion: ElementMotion, remembered: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """(g,) N in parallel to an element that carries, and (g,) a factor on its static force; c of each action.
+    structure: Structure, c: np.ndarray, element: int, motion: ElementMotion, remembered: np.ndarray | None = None,
+    spent: bool = False,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """(g,) N in parallel to an element that carries, and (g,) a factor on its static force; c of each action. What
+    belongs to the spring's own curve is not in it.
 
-    remembered (n,): what each action remembers, at one instant; None: the motion is from first contact on.
+    remembered (n,): what each action remembers, at one instant; None: the motion is from first contact on. spent: of
+    what acts where the spring is.
     """
     given = structure.elements[element].factor
     parallel = np.zeros_like(motion.crush)
     factor = np.ones_like(parallel) if given is None else given(motion.rate)
     for j, (value, action) in enumerate(zip(c, structure.actions, strict=True)):
-        if action.at == element and action.kind == "element":
+        if spent and not action.outlasts(structure.elements[element]):
+            continue
+        if action.at == element and action.kind == "element" and not action.in_curve:
             parallel = parallel + value * action.force(motion)
         elif action.at == element and action.kind == "memory":
             parallel = parallel + value * (trace(structure, action, motion) if remembered is None else remembered[j])
         elif action.at == element and action.kind == "factor":
             factor = factor * (1.0 + value * action.force(motion.rate))
     return parallel, factor
+
+
+def in_curve(actions: Sequence[Action], c: np.ndarray, element: int, crush: np.ndarray) -> np.ndarray:
+    """(g,) N that actions add to a spring's own curve at crush (g,) m."""
+    nothing = np.zeros_like(crush)
+    motion = ElementMotion(nothing, crush, nothing, crush, nothing)
+    ours = ((value, a) for value, a in zip(c, actions, strict=True) if a.in_curve and a.at == element)
+    return sum((value * action.force(motion) for value, action in ours), nothing)
 
 
 def trace(structure: Structure, action: Action, motion: ElementMotion) -> np.ndarray:

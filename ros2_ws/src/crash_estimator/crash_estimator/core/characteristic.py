@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .actions import beside_the_springs, coefficients
+from .actions import beside_the_springs, coefficients, in_curve
 from .effects.effect import ElementMotion
 from .estimate import Description, ElementState, Estimate
 from .structure import Element, Structure
@@ -51,17 +51,18 @@ class Characteristic(NamedTuple):
             return float(self.force[-1] / self.crush[-1] * crush)
         return float(np.interp(crush, self.crush, self.force))
 
-    def spring(self, crush: float, peak: float) -> float:
-        """N, at a crush and the largest crush so far, both in m."""
+    def spring(self, crush: float, peak: float, inside: float = 0.0) -> float:
+        """N, at a crush and the largest crush so far, both in m; inside: what effects add to the curve where it is
+        read."""
         if not self.tension and crush <= 0.0:
             return 0.0
         if self.unloading is None or crush >= peak:
-            return self.curve(crush)
-        force = self.curve(peak) - self.unloading * (peak - crush)
+            return self.curve(crush) + inside
+        force = self.curve(peak) + inside - self.unloading * (peak - crush)
         return force if self.tension and crush < 0.0 else max(force, 0.0)
 
-    def carries(self, crush: float, peak: float) -> bool:
-        return self.tension or (crush > 0.0 and self.spring(crush, peak) > 0.0)
+    def carries(self, crush: float, peak: float, inside: float = 0.0) -> bool:
+        return self.tension or (crush > 0.0 and self.spring(crush, peak, inside) > 0.0)
 
 
 def characteristics(
@@ -86,8 +87,10 @@ def _characteristic(
     if structure.actions or element.factor:
         time, peak = np.array([e.time_ns for e in after]) * 1e-9, np.maximum(np.maximum.accumulate(crush), 0.0)
         motion = ElementMotion(time, crush, rate, peak, force)
-        parallel, factor = beside_the_springs(structure, coefficients(structure, description, after[-1]), k, motion)
-        force = np.where(apart, 0.0, (force - parallel) / factor)
+        c = coefficients(structure, description, after[-1])
+        parallel, factor = beside_the_springs(structure, c, k, motion)
+        inside = in_curve(structure.actions, c, k, peak if element.unloads else crush)
+        force = np.where(apart, 0.0, (force - parallel) / factor - inside)
     squares = float(np.sum(rate[~apart] ** 2))
     damping = float(np.sum((damper * rate**2)[~apart])) / squares if squares else element.damping.value
     if element.stiffness.shape == "constant" and element.unloading is None:

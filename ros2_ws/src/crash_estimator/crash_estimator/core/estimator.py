@@ -83,7 +83,8 @@ class Estimator:
         stiffness = self.regressor.secant(state.update.theta, state.contact.peak_crush)
         unloading = self.regressor.unloading(state.update.theta)
         damping = state.update.theta[self.regressor.damping_index]
-        contact, law, events = self.contact.step(state.contact, motion, stiffness, unloading, damping)
+        inside = self.regressor.inside(state.update.theta, motion, state.contact.peak_crush)
+        contact, law, events = self.contact.step(state.contact, motion, stiffness, unloading, damping, inside)
         regression, forces = self.regressor.make(motion, law, state.update.theta, state.update.variance)
         method, update = state.method, state.update
         if motion.dt > 0.0 and self._excited(regression):

@@ -13,13 +13,15 @@ import numpy as np
 
 from crash_replay.recording import Recording
 
-from .actions import beside_the_springs, coefficients
+from .actions import beside_the_springs, coefficients, in_curve
 from .characteristic import Characteristic, characteristics
 from .derived_motion import between_samples
 from .effects.effect import ElementMotion
 from .estimate import Description, Estimate
+from .kinematics import beyond
 from .rating import Rating, rate
 from .structure import ModelError, Structure
+from .structure_parts import NOTHING, outlasts
 
 LONGEST_STEP = 2e-4
 """s; a coarser recording is simulated in several steps a sample."""
@@ -123,6 +125,7 @@ class _System:
                 self.masses[action.lighter] -= value
         self.carried = [(k, structure.body_index[b.carried_by]) for k, b in enumerate(structure.bodies) if b.carried_by]
         self.origin = np.array([e.origin for e in structure.elements])
+        self.play = np.array([e.play for e in structure.elements])
         self.never_pulls = np.array([not (e.tension or e.damper_pulls) for e in structure.elements], dtype=bool)
         self.acts = {a.element for a in structure.actions if a.element >= 0}
         self.remembering = [(j, a) for j, a in enumerate(structure.actions) if a.kind == "memory"]
@@ -141,7 +144,7 @@ class _System:
         rate = v[self.ends[:, 0]] - v[self.ends[:, 1]]
         for k in self.given:
             crush[k], rate[k] = np.interp(t, self.time, self.crushes[k]), np.interp(t, self.time, self.rates[k])
-        return crush, rate
+        return beyond(self.play, crush, rate)
 
     def start(self, t: float, x: np.ndarray, v: np.ndarray) -> _State:
         nothing = np.zeros(len(self.laws))
@@ -170,19 +173,32 @@ class _System:
         memory = self.remembered(state, crush)
         peak = np.maximum(state.peak, crush)
         force = np.array([
-            self.force(k, law, ElementMotion(t, c, r, p, 0.0), memory) if law.carries(c, p) else 0.0
+            self.force(k, law, ElementMotion(t, c, r, p, 0.0), memory)
             for k, (law, c, r, p) in enumerate(zip(self.laws, crush, rate, peak, strict=True))
         ])  # fmt: skip
         return np.where(self.never_pulls, np.maximum(force, 0.0), force)
 
     def force(self, element: int, law: Characteristic, motion: ElementMotion, memory: np.ndarray) -> float:
-        """N, of an element that carries, at one instant."""
-        spring, damper = law.spring(motion.crush, motion.peak), law.damping * motion.rate
+        """N, of an element at one instant."""
+        inside = self.inside(element, law, motion)
+        spent = not law.carries(motion.crush, motion.peak, inside)
+        lasting = self.structure.elements[element].acts_when_spent
+        if spent and (lasting == NOTHING or motion.crush <= 0.0):
+            return 0.0
+        damper = 0.0 if spent and not outlasts(lasting) else law.damping * motion.rate
+        spring = law.spring(motion.crush, motion.peak, inside)
         if element not in self.acts:
             return spring + damper
         instant = ElementMotion(*(np.array([value]) for value in motion._replace(static=spring)))
-        parallel, factor = beside_the_springs(self.structure, self.c, element, instant, memory)
+        parallel, factor = beside_the_springs(self.structure, self.c, element, instant, memory, spent)
         return float(spring * factor[0] + damper + parallel[0])
+
+    def inside(self, element: int, law: Characteristic, motion: ElementMotion) -> float:
+        """N that effects add to an element's own curve where it is read."""
+        if not any(action.in_curve for action in self.structure.actions):
+            return 0.0
+        at = motion.crush if law.unloading is None else motion.peak
+        return float(in_curve(self.structure.actions, self.c, element, np.array([at]))[0])
 
     def loads(self, t: float, state: _State) -> np.ndarray:
         """(b,) N: the elements' forces on each body, what it carries included, and what the effects add."""

@@ -101,6 +101,7 @@ class Kinematics:
         ]  # fmt: skip
         self.initial_displacement, self.initial_velocity = initial_motion(structure, test)
         self.origin = np.array([element.origin for element in elements])
+        self.play = np.array([element.play for element in elements])
 
     def init(self) -> KinematicState:
         channels, bodies = np.zeros(self.channel_count), np.zeros(len(self.structure.bodies))
@@ -183,7 +184,7 @@ class Kinematics:
             rate[element] = state.rate[element] + (slope - state.rate[element]) * dt / (dt + RATE_SMOOTHING)
         for element, column in self.rate_channels:
             rate[element] = values[column] if values[column] == values[column] else state.rate[element]
-        return crush, rate
+        return beyond(self.play, crush, rate) if self.play.any() else (crush, rate)
 
     def _measured(self, values: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
         measured = np.empty(len(self.structure.equations))
@@ -239,3 +240,8 @@ def _check_accelerations(structure: Structure) -> None:
                 "sample an acceleration channel is needed (`diagnose`, `estimate`, `simulate` and `report` derive it "
                 "from the whole recording)"
             )
+
+
+def beyond(play: np.ndarray, crush: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(e,) crush and rate beyond the play (e,) m to either side; 0 within it."""
+    return crush - np.clip(crush, -play, play), np.where(np.abs(crush) < play, 0.0, rate)

@@ -17,6 +17,7 @@ from .estimate import ParameterStatus
 from .kinematics import Motion
 from .regressor_errors import KNOWN_FROM, MotionErrors
 from .structure import Parameter, Structure
+from .structure_parts import outlasts
 
 SHORTEST_CRUSH = 1e-3
 """m: below this crush e-folds are not counted; it would take infinitely many to leave zero."""
@@ -122,6 +123,8 @@ class Regressor:
         self.of_spring = np.array(
             [p.is_stiffness or p.is_unloading or p.unit.startswith("N/m^") for p in parameters], dtype=bool
         )
+        lasting = np.array([outlasts(element.acts_when_spent) for element in structure.elements], dtype=bool)
+        self.outlasts = ~self.of_spring & lasting[self.element]
         self.drift_squared = np.array([self._drift(p) ** 2 for p in parameters])
         self.every = tuple(  # of all parameters, the actions' too: element, is_stiffness, estimated
             np.array(column)
@@ -143,7 +146,7 @@ class Regressor:
     ) -> tuple[Regression, Forces]:
         """theta (p,): the latest values, for what depends on them: the forces' change with errors of the motion;
         variance (p,) of each, for the same."""
-        carries = law.carries[self.element]
+        carries = np.where(self.outlasts, law.crushed[self.element], law.carries[self.element])
         lever = np.where(self.is_stiffness, law.lever[self.element], np.where(carries, motion.rate[self.element], 0.0))
         shift = law.shift
         if self.further is not None:
@@ -218,6 +221,10 @@ class Regressor:
         slope = np.where(law.on_line, self.known_unloading if unloading is None else unloading, slope)
         slope = slope if factor is None else factor * slope
         return np.where(law.carries, [slope, theta[self.damping_index]], 0.0)
+
+    def inside(self, theta: np.ndarray, motion: Motion, peak: np.ndarray) -> np.ndarray | float:
+        """(e,) N that effects add to the springs' own curves, by the latest theta; peak (e,) m before this sample."""
+        return self.actions.inside(theta, motion, peak) if self.actions is not None else 0.0
 
     def secant(self, theta: np.ndarray, peak: np.ndarray) -> np.ndarray:
         """(e,) N/m: each element's stiffness, at the crush `peak` (e,) where it has higher powers."""

@@ -20,7 +20,7 @@ import numpy as np
 
 from crash_replay.recording import Test
 
-from .structure_parts import Action, Body, Coefficient, EffectSpec, Element, ModelError, Parameter, Term
+from .structure_parts import NOTHING, Action, Body, Coefficient, EffectSpec, Element, ModelError, Parameter, Term
 
 __all__ = ["Action", "Body", "Coefficient", "EffectSpec", "Element", "ModelError", "Parameter", "Structure", "Term"]
 
@@ -151,7 +151,8 @@ class Structure:
     @property
     def first_order(self) -> bool:
         """Whether springs and dampers of the first power, which may pull, and known unloading are all there is."""
-        more = any(e.terms or e.unloading_slope or e.origin or e.factor or not e.damper_pulls for e in self.elements)
+        more = any(e.terms or e.unloading_slope or e.origin or e.play or e.factor for e in self.elements)
+        more |= any(not e.damper_pulls or e.acts_when_spent != NOTHING for e in self.elements)
         return not (more or self.actions or any(body.carried_by or body.applied for body in self.bodies))
 
     def is_held(self, body: int) -> bool:

@@ -73,6 +73,16 @@ class Term:
     coefficient: Coefficient  # N/m^power, or N (s/m)^power
 
 
+NOTHING, SPRINGS, ALL = "nothing", "springs", "all"
+"""What acts beside a spring that is spent, as long as there is crush: nothing, as of a crushed structure that stays
+short; elastic forces, functions of the crush alone; or all, dampers too, as in models of lumped masses."""
+
+
+def outlasts(acts_when_spent: str, of_crush_only: bool = False) -> bool:
+    """Whether a force beside the spring acts on where that is spent."""
+    return acts_when_spent == ALL or (of_crush_only and acts_when_spent == SPRINGS)
+
+
 @dataclass(frozen=True)
 class Element:
     """A spring and damper between two bodies."""
@@ -87,9 +97,16 @@ class Element:
     velocity: str | None = None  # channel of the rate of crush; None: the crush's derivative
     terms: tuple[Term, ...] = ()  # powers beyond the first
     damper_pulls: bool = True  # without tension: the damper may pull until the spring is spent; False: never
+    acts_when_spent: str = NOTHING  # what still does where the unloading line has come down to zero
     unloading_slope: Coefficient | None = None  # an unloading stiffness to be estimated, in place of a known one
     origin: float = 0.0  # m: the crush counts from here, as beyond a gap
+    play: float = 0.0  # m: to either side it carries nothing, and its crush counts from there
     factor: Callable[[np.ndarray], np.ndarray] | None = None  # of the rates (n,) m/s: what multiplies the static force
+
+    @property
+    def unloads(self) -> bool:
+        """On a line of its own."""
+        return bool(self.unloading or self.unloading_slope)
 
 
 @dataclass(frozen=True)
@@ -124,6 +141,12 @@ class Action:
     body: int = -1  # inertia: whose
     lighter: int = -1  # inertia: the body whose mass it was counted in, -1: none
     share: float = 1.0  # gain, offset: of the channel in its body's acceleration
+    of_crush_only: bool = False  # element: a function of the crush alone
+    in_curve: bool = False  # element: it belongs to the spring's own curve, and unloads along the spring's line
+
+    def outlasts(self, element: Element) -> bool:
+        """Whether it acts on where the element's spring is spent."""
+        return outlasts(element.acts_when_spent, self.of_crush_only)
 
     @property
     def element(self) -> int:

@@ -3,7 +3,7 @@ they are, or from `Estimate`s."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isfinite, isqrt
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -76,7 +76,7 @@ def follow(estimator: AnyEstimator, state: Any, rows: Rows) -> tuple[Any, Column
     However the samples are shared out to calls, states and estimates are the same to the last bit.
     """
     if hasattr(estimator, "follow"):  # a compiled one takes them all at once
-        return _follow_compiled(estimator, state, rows)
+        return _follow_compiled(cast("CompiledEstimator", estimator), state, rows)
     estimates: list[Estimate] = []
     for sample in rows.samples():
         try:

@@ -15,6 +15,7 @@ from crash_replay.said import say
 from ...core.diagnosis import DEFAULT, UNEXPLAINED, Diagnosis, diagnose
 from ...core.effects.effect import Effect
 from ...core.structure import EffectSpec
+from ...core.structure_parts import NOTHING
 from ...diagnosis_doubt import doubt
 from ...diagnosis_tables import diagnosis_tables
 from ...model_file import load_model
@@ -44,9 +45,12 @@ def apply(found: Diagnosis, had: tuple[EffectSpec, ...], effects: dict[str, Effe
     """Write the model's file, comments and all, with the added effects at its end -> what was added."""
     yaml = YAML()
     content = yaml.load(model_path(model).read_text(encoding="utf-8"))
+    unloading = {spec.target for spec in found.structure.effects if effects[spec.type].replaces == "unloading"}
     for element in found.structure.elements:
         if not element.damper_pulls:
             content["elements"][element.name]["damper_pulls"] = False
+        if element.acts_when_spent != NOTHING and (element.unloads or element.name in unloading):
+            content["elements"][element.name]["acts_when_spent"] = element.acts_when_spent
     added = found.structure.effects[len(had) :]
     if added:
         content.setdefault("effects", [])

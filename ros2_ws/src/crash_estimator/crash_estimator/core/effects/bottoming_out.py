@@ -2,6 +2,7 @@
 
 X in m, compression positive; c in N/m, never negative; where the stop sits is found. A free curve of an elastic
 element contains it, so it is offered where the element's stiffness is one constant or known, or unloads along a line.
+Form `in_curve`: it is a part of that spring's own curve, and unloads along the same line.
 """
 
 import numpy as np

@@ -2,6 +2,8 @@
 
     F = F_element(X - gap)  where X > gap,  else 0
 
+Form `play`, of an element that carries both ways: F = F_element(X + gap) where X < - gap as well.
+
 The coefficient is the gap in m.
 """
 

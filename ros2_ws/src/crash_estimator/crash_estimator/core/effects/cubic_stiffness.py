@@ -2,6 +2,7 @@
 
 X is the crush in m, compression positive; c in N/m^3, never negative. A free curve of an elastic element
 contains it, so it is offered where the element's stiffness is one constant or known, or unloads along a line.
+Form `in_curve`: it is a part of that spring's own curve, and unloads along the same line.
 """
 
 from .base import ElementForce, ElementMotion

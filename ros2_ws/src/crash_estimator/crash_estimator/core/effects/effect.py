@@ -67,6 +67,7 @@ class Effect:
     low: float = 0.0
     high: float = np.inf
     size: float | None = None  # order of magnitude of the coefficient; None: what carries half of the target's force
+    of_crush_only: bool = False  # its force is a function of the crush alone
 
     # What it acts on
     acts_on: ClassVar[str] = "element"  # the key of a model file: element, body, channel or between
@@ -77,7 +78,6 @@ class Effect:
     scales_static: ClassVar[bool] = False  # 1 + c h(V) times the spring
     remembers: ClassVar[bool] = False  # c z beside the spring, z hangs on the way that the crush has gone
     changes_law: ClassVar[bool] = False  # a constant of the spring's law itself, in which the force is not linear
-    compression_only: ClassVar[bool] = False  # an element that has it carries no tension
 
     # Its place in the rest of the model
     attaches_body: ClassVar[bool] = False  # a further body, driven by the channel that is the target
@@ -98,6 +98,10 @@ class Effect:
         """Of the coefficient as a model file states it."""
         return self.low, self.high
 
+    def shapes_of(self, variant: str) -> Mapping[str, Shape]:
+        """The shape constants that it has in one of its variants."""
+        return self.shapes
+
     def trial(self, motion: ElementMotion, **shapes: float) -> np.ndarray:
         """What its function gives on a motion that a user's effect is tried on."""
         return getattr(self, self.function)(motion, **shapes)
@@ -111,15 +115,21 @@ class Effect:
 
     # --- the motion of a diagnosis: `law` and its like are of `core.diagnosis.mechanics`
 
-    def changed_law(self, law: "Law", c: float) -> "Law":
+    def takes_tension_away(self, variant: str) -> bool:
+        """Whether an element that has it carries compression only."""
+        return False
+
+    def changed_law(self, law: "Law", c: float, variant: str) -> "Law":
         """The spring's law with the coefficient c in it."""
         return law
 
-    def law_derivative(self, on_line: np.ndarray, lag: np.ndarray, kx: np.ndarray, kp: np.ndarray) -> np.ndarray | None:
+    def law_derivative(
+        self, side: np.ndarray | float, on_line: np.ndarray, lag: np.ndarray, kx: np.ndarray, kp: np.ndarray
+    ) -> np.ndarray | None:
         """(g,) of the spring's force by the coefficient in its law; None where it has none there.
 
-        on_line (g,): on the unloading line; lag (g,) m: crush less its peak, times what scales the
-        spring's force, 0 where apart; kx, kp (g,) N/m: slopes by crush and peak.
+        side (g,): -1 at the far side of a play, else 1; on_line (g,): on the unloading line; lag (g,) m: crush less its
+        peak, times what scales the spring's force, 0 where apart; kx, kp (g,) N/m: slopes by crush and peak.
         """
         return None
 
@@ -132,7 +142,7 @@ class Effect:
         return {}
 
     def body_load(
-        self, addition: "Addition", time: np.ndarray, inertial: Callable[[str], np.ndarray]
+        self, addition: "Addition", time: np.ndarray, inertial: Callable[[str], np.ndarray], **shapes: float
     ) -> tuple[str, np.ndarray] | None:
         """A body, and the force (g,) N on it for one unit; inertial(channel): acceleration (g,) of an attached body."""
         return None

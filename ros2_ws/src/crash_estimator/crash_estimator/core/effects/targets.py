@@ -36,12 +36,15 @@ def checked(structure: Structure, spec: EffectSpec, effects: Mapping[str, Effect
         raise ModelError(
             f"{what} cannot act on {spec.target!r}; it needs {NOUN[effect.acts_on]}: {_choice(spec.target, targets)}"
         )
-    for name in spec.shape:
-        if name not in effect.shapes:
-            raise ModelError(f"{what} has no shape constant {name!r}; it has {', '.join(effect.shapes) or 'none'}")
     if spec.variant not in effect.variants:
         forms = ", ".join(filter(None, effect.variants))
         raise ModelError(f"{what} has no form {spec.variant!r}; " + (f"it has {forms}" if forms else "leave it out"))
+    shapes = effect.shapes_of(spec.variant)
+    for name in spec.shape:
+        if name not in shapes:
+            in_form = f" in form {spec.variant!r}" if spec.variant else ""
+            has = ", ".join(shapes) or "none"
+            raise ModelError(f"{what} has no shape constant {name!r}{in_form}; it has {has}")
     if spec.coefficient is not None:
         _admissible(f"{what} on {spec.target}", spec.coefficient, effect)
     for name, value in spec.shape.items():

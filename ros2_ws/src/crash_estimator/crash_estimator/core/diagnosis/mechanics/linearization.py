@@ -82,9 +82,12 @@ def linearise(
     inverse[driven] = 0.0
     actions = _Actions(inverse)
     loads, forces = _link_forces(experiment, theta, trajectory, others, contact_ramp, actions)
-    for term, k, load in body_loads(layout, record, attached_inertia(layout, record, trajectory)):
-        loads[:, k] += float(theta[term.coefficient]) * load
-        actions.act(term.coefficient, k, inverse[k] * load)
+    for term, k, force, by_shapes in body_loads(layout, theta, record, attached_inertia(layout, record, trajectory)):
+        c = float(theta[term.coefficient])
+        loads[:, k] += c * force
+        actions.act(term.coefficient, k, inverse[k] * force)
+        for parameter, column in zip(term.shapes.values(), by_shapes, strict=True):
+            actions.act(parameter, k, inverse[k] * c * column)
     for k, body in enumerate(layout.structure.bodies):
         if body.applied:
             loads[:, k] += record.signals[body.applied].on_grid

@@ -5,7 +5,8 @@
     F  = S (1 + c h(V)) + gate (C V + sum of c_i f_i + sum of c_j z_j)
 
 `gate` is 1 where the link carries and 0 where it is apart; it turns within one time step, in proportion to the time
-carried, so that a force that jumps at contact gives the right momentum whatever the step. A link without tension whose
+carried, so that a force that jumps at contact gives the right momentum whatever the step. Of what outlasts a spring
+that is spent (`acts_when_spent`) it is 1 as long as there is crush. A link without tension whose
 damper never pulls carries nothing where F is negative though S is not. What z remembers follows
 
     dz_t = a_t dz_{t-1} + b_t (dX_t - dX_{t-1}),
@@ -17,9 +18,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects.effect import ElementMotion
+from ...structure_parts import outlasts
 from ..parameterization.terms import Link, Term
 from .spring import NO_CURVE, Law, Spring, spring
 
+NOTHING = np.zeros(0)
 SMALL_CRUSH = 1e-6
 """m: of a central difference; what an effect's force may do within a micrometre is no physics."""
 
@@ -29,9 +32,6 @@ SMALL_RATE = 1e-4
 FACTOR_RATE = 1e-3
 """m/s: of a factor's: a power below 1 has an infinite slope at rest, where only its mean over a step counts."""
 
-LOG_STEP = 1e-4
-"""Of the logarithm of a shape constant: a central difference errs by its square."""
-
 
 class Memory(NamedTuple):
     """How one remembering force follows a change of the motion, over g instants."""
@@ -39,6 +39,27 @@ class Memory(NamedTuple):
     kept: np.ndarray  # (g,) dz_t/dz_{t-1}
     by_crush: np.ndarray  # (g,) dz_t/dX_t = - dz_t/dX_{t-1}, 1/m
     force: np.ndarray  # (g,) N, dF_t/dz_t
+
+
+class _Inside(NamedTuple):
+    """What an effect adds to the spring's curve where that is read."""
+
+    force: np.ndarray  # (g,) N
+    slope: np.ndarray  # (g,) N/m
+    parameters: list[int]
+    columns: list[np.ndarray]  # (g,) dF/dparameter
+
+
+class _Beside:
+    """Forces beside the spring that act through the same gate: their sum, N, and its slopes by crush and rate."""
+
+    def __init__(self, gate: np.ndarray, slope: np.ndarray, nothing: np.ndarray):
+        """gate (g,), and its change with the crush, 1/m."""
+        self.gate, self.slope = gate, slope
+        self.force = self.px = self.pv = nothing
+
+    def add(self, force: np.ndarray, px: np.ndarray | float, pv: np.ndarray | float) -> None:
+        self.force, self.px, self.pv = self.force + force, self.px + px, self.pv + pv
 
 
 class LinkForce(NamedTuple):
@@ -63,8 +84,12 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
     parameters: list[int] = []
     columns: list[np.ndarray] = []
     law = _law(link, theta)
-    found = Spring(*spring(law, crush, rate, dt))
-    x, peak, on_line, at, gate = found.x, found.peak, found.on_line, found.at, found.gate
+    found = Spring(*spring(law, crush, rate, dt, NOTHING, NOTHING))
+    inside = [_inside(term, theta, found.at) for term in link.in_curve]
+    if inside:  # where the curve is read hangs on the crush alone
+        more, steeper = (sum(each) for each in zip(*((one.force, one.slope) for one in inside), strict=True))
+        found = Spring(*spring(law, crush, rate, dt, more, steeper))
+    x, peak, on_line, at = found.x, found.peak, found.on_line, found.at
     static, kx, kp, weight, carries = found.static, found.kx, found.kp, found.weight, found.carries
     factor = np.ones_like(x)
     kv, force = np.zeros_like(x), static
@@ -81,38 +106,48 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
         parameters.append(link.constant)
         columns.append(at * carries * factor)
 
+    for one in inside:
+        parameters += one.parameters
+        columns += [column * carries * factor for column in one.columns]
+
     damping = theta[link.damping] if link.damping is not None else link.known_damping
     memories: list[Memory] = []
     if damping or link.damping is not None or link.parallel or link.remembering:
-        parallel, px, pv = damping * rate, np.zeros_like(x), np.full_like(x, damping)
+        contact = _Beside(found.gate, found.gate_slope, np.zeros_like(x))
+        crushed = _Beside(found.crushed, found.crushed_slope, np.zeros_like(x)) if law.unloads else contact
+        beside = crushed if outlasts(link.acts_when_spent) else contact
+        beside.add(damping * rate, 0.0, damping)
         if link.damping is not None:
             parameters.append(link.damping)
-            columns.append(gate * rate)
+            columns.append(beside.gate * rate)
         motion = ElementMotion(time, x, rate, peak, static)
         for term in link.parallel:
             c = theta[term.coefficient]
-            f = term.addition.effect.force(motion, **_shapes(term, theta))
+            f = term.addition.effect.force(motion, **term.shapes_at(theta))
+            beside = crushed if link.outlasts(term.addition.effect) else contact
             parameters.append(term.coefficient)
-            columns.append(gate * f)
+            columns.append(beside.gate * f)
             if not c:  # nothing that a slope or a shape constant would change
                 continue
             fx, fv, by_shape = _slopes(term, theta, motion)
-            parallel, px, pv = parallel + c * f, px + c * fx, pv + c * fv
+            beside.add(c * f, c * fx, c * fv)
             parameters += term.shapes.values()
-            columns += [gate * c * d for d in by_shape]
+            columns += [beside.gate * c * d for d in by_shape]
         for term in link.remembering:
-            parallel, memory = _remembered(term, link, theta, x, gate, parallel, parameters, columns)
-            px = px + theta[term.coefficient] * memory.by_crush
-            memories.append(memory)
-        force = force + gate * parallel
-        kx, kv = kx + gate * px + found.gate_slope * parallel, kv + gate * pv
+            beside = crushed if link.outlasts(term.addition.effect) else contact
+            memories.append(_remembered(term, link, theta, x, beside, parameters, columns))
+        for beside in (contact, crushed) if crushed is not contact else (contact,):
+            force = force + beside.gate * beside.force
+            kx, kv = kx + beside.gate * beside.px + beside.slope * beside.force, kv + beside.gate * beside.pv
         if law.unloads:
             # on the unloading line it is the spring's force that opens the contact: what changes it, moves the instant
-            opens = np.where(on_line, found.gate_slope * parallel / max(law.slope, 1.0), 0.0)
+            opens = np.where(on_line, found.gate_slope * contact.force / max(law.slope, 1.0), 0.0)
             weight, kp = weight + opens[:, None] * found.weight_line, kp + opens * found.kp_line
-            columns = [c + opens * at if p == link.constant else c for p, c in zip(parameters, columns, strict=True)]
+            moved = {link.constant: at} | {p: column for one in inside for p, column in zip(*one[2:], strict=True)}
+            columns = [c + opens * moved.get(p, 0.0) for p, c in zip(parameters, columns, strict=True)]
+    side = np.sign(crush) if law.play else 1.0
     for term in link.in_law:
-        column = term.addition.effect.law_derivative(on_line, (x - peak) * carries * factor, kx, kp)
+        column = term.addition.effect.law_derivative(side, on_line, (x - peak) * carries * factor, kx, kp)
         if column is not None:
             parameters.append(term.coefficient)
             columns.append(column)
@@ -136,41 +171,39 @@ def _law(link: Link, theta: np.ndarray) -> Law:
     elif link.constant is not None:
         stiffness = theta[link.constant]
     slope = link.unloading
-    law = Law(0.0, slope is not None, float(slope or 0.0), *curve, float(stiffness), not link.tension)
+    law = Law(0.0, False, slope is not None, float(slope or 0.0), *curve, float(stiffness), not link.tension)
     for term in link.in_law:
-        law = term.addition.effect.changed_law(law, float(theta[term.coefficient]))
+        law = term.addition.effect.changed_law(law, float(theta[term.coefficient]), term.addition.variant)
     return law
 
 
-def _remembered(term: Term, link: Link, theta, x, gate, parallel, parameters, columns) -> tuple[np.ndarray, Memory]:
-    """The parallel force with c z added, and its memory; derivatives are appended."""
-    c, shapes = theta[term.coefficient], _shapes(term, theta)
+def _inside(term: Term, theta: np.ndarray, at: np.ndarray) -> _Inside:
+    nothing, c = np.zeros_like(at), theta[term.coefficient]
+    motion = ElementMotion(nothing, at, nothing, at, nothing)
+    f = term.addition.effect.force(motion, **term.shapes_at(theta))
+    slope, _, by_shape = _slopes(term, theta, motion)
+    parameters = [term.coefficient, *term.shapes.values()]
+    return _Inside(c * f, c * slope, parameters, [f, *(c * each for each in by_shape)])
+
+
+def _remembered(term: Term, link: Link, theta, x, beside: _Beside, parameters, columns) -> Memory:
+    """c z is added to the forces beside the spring, derivatives are appended -> its memory."""
+    c, shapes = theta[term.coefficient], term.shapes_at(theta)
     memory = partial(term.addition.effect.memory, form=term.addition.variant)
     crush = np.concatenate([[0.0], x if link.tension else np.maximum(x, 0.0)])
     z, kept, by_crush = (each[1:] for each in memory(crush, 0.0, **shapes))
     parameters += [term.coefficient, *term.shapes.values()]
+    gate = beside.gate
     columns += [gate * z]
-    columns += [gate * c * d for d in _by_shapes(term, theta, lambda **s: memory(crush, 0.0, **s)[0][1:])]
+    columns += [gate * c * d for d in term.by_shapes(theta, lambda **s: memory(crush, 0.0, **s)[0][1:])]
     follows = by_crush if link.tension else np.where(x > 0.0, by_crush, 0.0)
-    return parallel + c * z, Memory(kept, follows, gate * c)
-
-
-def _shapes(term: Term, theta: np.ndarray, changed: str = "", by: float = 0.0) -> dict[str, float]:
-    return {name: float(np.exp(theta[p] + (by if name == changed else 0.0))) for name, p in term.shapes.items()}
-
-
-def _by_shapes(term: Term, theta: np.ndarray, function) -> list[np.ndarray]:
-    """Derivatives of function(**shapes) by the logarithm of each shape constant."""
-    return [
-        (function(**_shapes(term, theta, name, LOG_STEP)) - function(**_shapes(term, theta, name, -LOG_STEP)))
-        / (2.0 * LOG_STEP)
-        for name in term.shapes
-    ]
+    beside.add(c * z, c * follows, 0.0)
+    return Memory(kept, follows, gate * c)
 
 
 def _slopes(term: Term, theta: np.ndarray, motion: ElementMotion):
     """Of an effect's force, by crush and rate, and its derivatives by the logarithm of each shape constant."""
-    effect, shapes = term.addition.effect, _shapes(term, theta)
+    effect, shapes = term.addition.effect, term.shapes_at(theta)
 
     def shifted(sign):
         return effect.force(motion._replace(crush=motion.crush + sign * SMALL_CRUSH), **shapes)
@@ -180,12 +213,12 @@ def _slopes(term: Term, theta: np.ndarray, motion: ElementMotion):
 
     fx = (shifted(1.0) - shifted(-1.0)) / (2.0 * SMALL_CRUSH)
     fv = (faster(1.0) - faster(-1.0)) / (2.0 * SMALL_RATE)
-    return fx, fv, _by_shapes(term, theta, lambda **shapes: effect.force(motion, **shapes))
+    return fx, fv, term.by_shapes(theta, lambda **shapes: effect.force(motion, **shapes))
 
 
 def _factor(term: Term, theta: np.ndarray, rate: np.ndarray):
     """h, dh/dV, and its derivatives by the logarithm of each shape constant."""
-    effect, shapes = term.addition.effect, _shapes(term, theta)
+    effect, shapes = term.addition.effect, term.shapes_at(theta)
     up, down = (effect.factor(rate + step, **shapes) for step in (FACTOR_RATE, -FACTOR_RATE))
-    by_shape = _by_shapes(term, theta, lambda **shapes: effect.factor(rate, **shapes))
+    by_shape = term.by_shapes(theta, lambda **shapes: effect.factor(rate, **shapes))
     return effect.factor(rate, **shapes), (up - down) / (2.0 * FACTOR_RATE), by_shape

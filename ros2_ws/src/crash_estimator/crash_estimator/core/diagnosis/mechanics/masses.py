@@ -1,6 +1,8 @@
 """Masses as the parameters make them, and forces on single bodies."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,14 +34,25 @@ def mass_shares(layout: Layout) -> Iterator[tuple[int, int, float]]:
             yield layout.structure.body_index[name], term.coefficient, share
 
 
+class BodyLoad(NamedTuple):
+    """An external force, or an attached body's inertia, for one unit of its coefficient."""
+
+    term: Term
+    body: int
+    force: np.ndarray  # (g,) N
+    by_shapes: list[np.ndarray]  # (g,) N by the logarithm of each shape constant
+
+
 def body_loads(
-    layout: Layout, record: ObservedRecord, inertial: Callable[[str], np.ndarray]
-) -> Iterator[tuple[Term, int, np.ndarray]]:
-    """(term, body, force (g,) N for one unit of its coefficient): constant forces, and attached bodies' inertia."""
+    layout: Layout, theta: np.ndarray, record: ObservedRecord, inertial: Callable[[str], np.ndarray]
+) -> Iterator[BodyLoad]:
     for term in layout.terms:
-        load = term.addition.effect.body_load(term.addition, record.time, inertial)
-        if load is not None:
-            yield term, layout.structure.body_index[load[0]], load[1]
+        load = partial(term.addition.effect.body_load, term.addition, record.time, inertial)
+        found = load(**term.shapes_at(theta))
+        if found is not None:
+            body, force = found
+            by_shapes = term.by_shapes(theta, lambda load=load, **shapes: load(**shapes)[1])
+            yield BodyLoad(term, layout.structure.body_index[body], force, by_shapes)
 
 
 def attached_inertia(layout: Layout, record: ObservedRecord, trajectory: Trajectory) -> Callable[[str], np.ndarray]:
@@ -70,6 +83,6 @@ def balance_of(experiment: Experiment, theta: np.ndarray) -> np.ndarray:
             force -= mass[k] * motion.a[:, k]
         if body.applied:
             force += record.signals[body.applied].on_grid
-    for term, _, load in body_loads(layout, record, lambda channel: motion.a[:, layout.attached[channel]]):
-        force += theta[term.coefficient] * load
+    for load in body_loads(layout, theta, record, lambda channel: motion.a[:, layout.attached[channel]]):
+        force += theta[load.term.coefficient] * load.force
     return force

@@ -19,6 +19,7 @@ class Law(NamedTuple):
     """What the spring's force hangs on, at one parameter vector."""
 
     gap: float  # m
+    play: bool  # as large a gap to the other side, too
     unloads: bool  # on a line of its own
     slope: float  # N/m of that line
     knots: np.ndarray  # (n,) m; none: linear
@@ -46,21 +47,27 @@ class Spring(NamedTuple):
     carries: np.ndarray  # (g,) 1 or 0
     gate: np.ndarray  # (g,) share of the time step in which it is in contact
     gate_slope: np.ndarray  # (g,) 1/m
+    crushed: np.ndarray  # (g,) share of the time step in which there is crush, whether the spring is spent or not
+    crushed_slope: np.ndarray  # (g,) 1/m
 
 
 @njit(cache=True, error_model="numpy")
-def spring(law, crush, rate, dt):
-    """The equations of `linkforce` for crush (g,) m, rate (g,) m/s and the length of each step dt (g,) s."""
-    gap, unloads, slope, knots, forces, columns, stiffness, one_way = law
+def spring(law, crush, rate, dt, more, more_slope):
+    """The equations of `linkforce` for crush (g,) m, rate (g,) m/s and the length of each step dt (g,) s.
+
+    more, more_slope: (g,) N and N/m by which the curve is higher and steeper where it is read; or empty.
+    """
+    gap, play, unloads, slope, knots, forces, columns, stiffness, one_way = law
     g, last = len(crush), len(knots) - 2
     x, peak, at, static = np.empty(g), np.empty(g), np.empty(g), np.empty(g)
     kx, kp, kp_line = np.empty(g), np.empty(g), np.empty(g)
     loading, on_line = np.empty(g, np.bool_), np.empty(g, np.bool_)
     knot, weight, weight_line = np.full((g, 2), -1), np.zeros((g, 2)), np.zeros((g, 2))
     carries, gate, gate_slope = np.ones(g), np.ones(g), np.zeros(g)
+    crushed, crushed_slope = np.ones(g), np.zeros(g)
     highest, cell = 0.0, 0
     for t in range(g):
-        x[t] = crush[t] - gap
+        x[t] = crush[t] - (min(max(crush[t], -gap), gap) if play else gap)
         highest = max(highest, x[t])
         peak[t] = highest
         loading[t] = x[t] >= highest
@@ -80,6 +87,9 @@ def spring(law, crush, rate, dt):
         else:
             k = stiffness
             static[t] = k * at[t]
+        if len(more):
+            static[t] += more[t]
+            k += more_slope[t]
         kx[t], kp_line[t] = k, 0.0
         if on_line[t]:
             static[t] -= slope * (highest - x[t])
@@ -91,17 +101,29 @@ def spring(law, crush, rate, dt):
                 margin = min(margin, static[t] / max(slope, 1.0))
             carries[t] = 1.0 if x[t] > 0.0 and not spent else 0.0
             width = max(abs(rate[t]) * dt[t], NARROWEST)
-            ramp = margin / width + 0.5
-            gate[t] = min(max(ramp, 0.0), 1.0)
-            if 0.0 < ramp < 1.0:
-                gate_slope[t] = 1.0 / width
+            gate[t], gate_slope[t] = _opened(margin, width)
+            crushed[t], crushed_slope[t] = _opened(x[t], width)
+        elif play:
+            margin, width = abs(crush[t]) - gap, max(abs(rate[t]) * dt[t], NARROWEST)
+            carries[t] = 1.0 if margin > 0.0 else 0.0
+            gate[t], gate_slope[t] = _opened(margin, width)
+            gate_slope[t] = np.sign(crush[t]) * gate_slope[t]
+            crushed[t], crushed_slope[t] = gate[t], gate_slope[t]
         open_ = carries[t]
         static[t] *= open_
         kx[t] *= open_
         kp[t] = kp_line[t] * open_
         weight[t, 0], weight[t, 1] = weight_line[t, 0] * open_, weight_line[t, 1] * open_
     if one_way and x[0] >= 0.0 and rate[0] > 0.0:
-        gate[0] = 1.0  # touching at time zero: it carries from then on
+        gate[0] = crushed[0] = 1.0  # touching at time zero: it carries from then on
     return (
-        x, peak, loading, on_line, at, static, kx, kp, kp_line, knot, weight, weight_line, carries, gate, gate_slope
+        x, peak, loading, on_line, at, static, kx, kp, kp_line, knot, weight, weight_line, carries, gate, gate_slope,
+        crushed, crushed_slope,
     )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _opened(margin, width):
+    """Share of the time step in which a contact is open by its margin, and its change with the crush, 1/m."""
+    ramp = margin / width + 0.5
+    return min(max(ramp, 0.0), 1.0), 1.0 / width if 0.0 < ramp < 1.0 else 0.0

@@ -167,8 +167,9 @@ def _element_link(b, k, element, index, curve, magnitudes, additions, terms) -> 
         element.name,
         ends=(a, c),
         crush_ends=(-1, -1) if element.displacement else (a, c),
-        tension=element.tension and not any(term.addition.effect.compression_only for term in here),
+        tension=element.tension and not any(t.addition.effect.takes_tension_away(t.addition.variant) for t in here),
         damper_pulls=element.damper_pulls,
+        acts_when_spent=element.acts_when_spent,
         curve=curve,
         constant=constant,
         known_stiffness=stiffness.value,
@@ -190,7 +191,7 @@ def _term(b: Builder, addition: Addition, magnitudes: Magnitudes) -> Term:
     start = min(max(start, low), effect.high)
     coefficient = b.add(f"{effect.name} {addition.target}", start, std, low=low, high=effect.high)
     shapes = {}
-    for name, shape in effect.shapes.items():
+    for name, shape in effect.shapes_of(addition.variant).items():
         unit = magnitudes.shape_unit(shape, addition.target)
         low, high = np.log(shape.low * unit), np.log(shape.high * unit)
         start = np.log(addition.shapes[name])

@@ -19,7 +19,7 @@ def _addition(
     effect = checked(structure, spec, effects, magnitudes.records[0].test)
     shapes = {
         name: shape.starts[len(shape.starts) // 2] * magnitudes.shape_unit(shape, spec.target)
-        for name, shape in effect.shapes.items()
+        for name, shape in effect.shapes_of(spec.variant).items()
     } | dict(spec.shape)
     coefficient = spec.coefficient
     if coefficient is not None:

@@ -1,11 +1,19 @@
 """What a layout's parameters belong to: terms (an addition with its parameters) and links, which carry a force."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from ...effects.effect import Addition
+import numpy as np
+
+from ...effects.effect import Addition, Effect
+from ...effects.kinds.element_force import IN_CURVE
+from ...structure_parts import NOTHING, outlasts
 from .free_curve import Curve
+
+LOG_STEP = 1e-4
+"""Of the logarithm of a shape constant: a central difference errs by its square."""
 
 
 class Term(NamedTuple):
@@ -14,6 +22,18 @@ class Term(NamedTuple):
     addition: Addition
     coefficient: int
     shapes: dict[str, int]
+
+    def shapes_at(self, theta: np.ndarray, changed: str = "", by: float = 0.0) -> dict[str, float]:
+        """Its shape constants, the logarithm of one of them changed."""
+        return {name: float(np.exp(theta[p] + (by if name == changed else 0.0))) for name, p in self.shapes.items()}
+
+    def by_shapes(self, theta: np.ndarray, function: Callable[..., np.ndarray]) -> list[np.ndarray]:
+        """Derivatives of function(**shapes) by the logarithm of each shape constant."""
+        return [
+            (function(**self.shapes_at(theta, name, LOG_STEP)) - function(**self.shapes_at(theta, name, -LOG_STEP)))
+            / (2.0 * LOG_STEP)
+            for name in self.shapes
+        ]
 
 
 @dataclass(frozen=True)
@@ -25,6 +45,7 @@ class Link:
     crush_ends: tuple[int, int]  # -1, -1: measured
     tension: bool
     damper_pulls: bool = True  # without tension: a force beside the spring's may be negative while that one is positive
+    acts_when_spent: str = NOTHING  # beside a spring whose unloading line has come down to zero
     curve: Curve | None = None
     constant: int | None = None
     known_stiffness: float = 0.0
@@ -36,10 +57,19 @@ class Link:
     velocity: str | None = None
     terms: tuple[Term, ...] = ()  # of effects that act on it
 
+    def outlasts(self, effect: Effect) -> bool:
+        """Whether its force acts on where the spring is spent."""
+        return outlasts(self.acts_when_spent, effect.of_crush_only)
+
     @cached_property
     def parallel(self) -> tuple[Term, ...]:
         """Forces beside the spring."""
-        return tuple(term for term in self.terms if term.addition.effect.in_parallel)
+        return tuple(t for t in self.terms if t.addition.effect.in_parallel and t.addition.variant != IN_CURVE)
+
+    @cached_property
+    def in_curve(self) -> tuple[Term, ...]:
+        """Functions of the crush that belong to the spring's own curve."""
+        return tuple(t for t in self.terms if t.addition.effect.in_parallel and t.addition.variant == IN_CURVE)
 
     @cached_property
     def remembering(self) -> tuple[Term, ...]:

@@ -173,7 +173,7 @@ def _answer(
         left_before=before,
         noise=evidence.noise,
         tolerance=tolerance,
-        text=verdict_text(verdict, evidence, tolerance, reports, given, final, floor, path.structure is structure),
+        text=verdict_text(verdict, evidence, tolerance, reports, given, final, floor, structure),
         residual_rms=Rms(given.residuals.rms, final.residuals.rms, floor),
         free_run_rms=Rms(runs[0], runs[-1]),
         ranking=ranking,

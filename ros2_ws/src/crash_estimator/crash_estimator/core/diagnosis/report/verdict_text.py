@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 from crash_replay.gravity import G
 
+from ...structure import Structure
+from ...structure_parts import ALL, SPRINGS
 from ..selection.fitted_model import Model
 from ..selection.thresholds import THRESHOLDS
 from .left import Left, vibration_of
@@ -12,13 +14,16 @@ from .time_zero_step import TIME_ZERO, signals_begin
 from .tolerance import Tolerance
 from .verdict import ADEQUATE, EFFECT_MISSING, Evidence, Verdict
 
+LASTING = {SPRINGS: "elastic forces that act on", ALL: "all forces that act on, dampers' too,"}
+"""By `acts_when_spent`."""
+
 
 def verdict_text(
     verdict: Verdict, evidence: Evidence, tolerance: Tolerance, steps: Sequence[StepReport], first: Model,
-    final: Model, floor: float, as_given: bool,
+    final: Model, floor: float, structure: Structure,
 ) -> str:  # fmt: skip
-    """first, final: the model as given and with what was added; floor: RMS of the sensors' noise, m/s^2; as_given:
-    dampers of compression-only elements may pull as the model file says."""
+    """first, final: the model as given and with what was added; floor: RMS of the sensors' noise, m/s^2; structure: as
+    the model file says."""
     if verdict.word == ADEQUATE:
         said = f"adequate: {_adequate(evidence, tolerance, final, floor)}"
     elif verdict.word == EFFECT_MISSING:
@@ -28,11 +33,21 @@ def verdict_text(
     below = final.records[0].below
     if below < float("inf"):
         said += f"; what rings above {below:g} Hz, {vibration_of(final) / G:.3g} g, is left out"
-    said = said if as_given else f"{said}; with contacts that never pull, not even by their dampers"
+    said = "; with ".join([said, *_contacts_otherwise(structure, final.fit.layout.structure)])
     if steps and steps[0].effect == TIME_ZERO:
         moved = steps[0].shape or {steps[0].target: steps[0].coefficient}
         said += f"; {signals_begin(moved)}: `import --time-zero auto` moves it"
     return said
+
+
+def _contacts_otherwise(given: Structure, assumed: Structure) -> list[str]:
+    """What the recordings bear out of the contacts, and the model file does not say."""
+    pairs, found = list(zip(given.elements, assumed.elements, strict=True)), []
+    if any(g.damper_pulls and not a.damper_pulls for g, a in pairs):
+        found.append("contacts that never pull, not even by their dampers")
+    lasting = {a.acts_when_spent for g, a in pairs if g.acts_when_spent != a.acts_when_spent}
+    found += [f"{LASTING[what]} beside a spring that is spent, as long as there is crush" for what in lasting]
+    return found
 
 
 def _adequate(evidence: Evidence, tolerance: Tolerance, final: Model, floor: float) -> str:

@@ -1,17 +1,19 @@
-"""The selection under other assumptions, where the first ones may be what is wrong: finer curves, dampers that push.
+"""The selection under other assumptions, where the first ones may be what is wrong: finer curves, other contacts.
 
 A model file says neither how sharply a structure folds, nor, unless it is asked to, whether the damper beside a spring
-that carries compression only may pull until that is spent.
+that carries compression only may pull, and what still acts where that spring is spent.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
 from ...effects.effect import Addition, Effect
 from ...structure import Structure
+from ...structure_parts import ALL, SPRINGS
 from ..mechanics.linearization import linearise
 from ..observation.record import ObservedRecord
 from ..output_error.gauss_newton import Fit, fit
@@ -26,7 +28,7 @@ from .acceptance import share_removed
 from .fitted_model import Model, fit_model
 from .forward_selection import forward_selection
 from .pruning import up_to_the_least_error
-from .selection_step import SelectionStep
+from .selection_step import SelectionStep, as_found
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
 
@@ -71,9 +73,10 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
 
 def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
     path = _as_exact_as_needed(structure, records, effects)
-    pushing = never_pulling(structure)
-    if pushing is not structure and not out_of_time() and _may_be_explained_by(pushing, path, path.records):
-        path = max(path, _as_exact_as_needed(pushing, path.records, effects), key=SelectionPath.rank)
+    for assumed in (never_pulling, elastic_when_spent, all_when_spent):
+        other = assumed(path.structure)
+        if other != path.structure and not out_of_time() and _may_be_explained_by(other, path, path.records):
+            path = max(path, _as_exact_as_needed(other, path.records, effects), key=SelectionPath.rank)
     return path
 
 
@@ -91,42 +94,68 @@ def first_believed(path: SelectionPath) -> SelectionPath:
 
 
 def never_pulling(structure: Structure) -> Structure:
-    """The structure whose dampers never pull where their element carries compression only; itself where none can."""
-    if all(element.tension or not element.damper_pulls for element in structure.elements):
-        return structure
-    elements = (e if e.tension else replace(e, damper_pulls=False) for e in structure.elements)
-    return replace(structure, elements=tuple(elements))
+    """The structure whose dampers never pull where their element carries compression only."""
+    elements = tuple(e if e.tension else replace(e, damper_pulls=False) for e in structure.elements)
+    return replace(structure, elements=elements)
 
 
-def _may_be_explained_by(pushing: Structure, path: SelectionPath, records: Sequence[ObservedRecord]) -> bool:
-    """Something is missing, and contacts that never pull would explain some of it.
+def elastic_when_spent(structure: Structure) -> Structure:
+    """The structure where elastic forces beside a spring that is spent act on, as long as there is crush."""
+    return _acting_when_spent(structure, SPRINGS)
+
+
+def all_when_spent(structure: Structure) -> Structure:
+    """The structure where all forces beside a spring that is spent act on, as long as there is crush."""
+    return _acting_when_spent(structure, ALL)
+
+
+def _acting_when_spent(structure: Structure, what: str) -> Structure:
+    return replace(structure, elements=tuple(replace(e, acts_when_spent=what) for e in structure.elements))
+
+
+def _may_be_explained_by(other: Structure, path: SelectionPath, records: Sequence[ObservedRecord]) -> bool:
+    """Something is missing, and contacts as they are assumed otherwise would explain some of it.
 
     Taken the wrong way, a damper that pulls looks like another effect.
     """
     final = path.final
     if len(final.additions) == path.present and final.white:
         return False
-    magnitudes = measure_magnitudes(pushing, records, CELLS)
+    magnitudes = measure_magnitudes(other, records, CELLS)
     samples = sum(record.bins * record.measured.shape[1] for record in records)
     models = [step.before for step in path.steps]
-    for model in models if models[-1] is final else [*models, final]:
-        pulling = in_the_sensors_noise(model, records)
-        if not _contacts_pull(pulling):
+    models = models if models[-1] is final else [*models, final]
+    found = ((model.additions, in_the_sensors_noise(model, records)) for model in models)
+    for additions, as_recorded in chain(found, _likely(path)):
+        if not _moves_otherwise(as_recorded, other):
             continue
-        other = fit_model(magnitudes, records, model.additions).fit
-        misfit = 0.5 * max(pulling.cost - samples, 0.0)  # nats
-        if other.evidence > pulling.evidence + THRESHOLDS.gain + THRESHOLDS.least_share * misfit:
+        otherwise = fit_model(magnitudes, records, additions).fit
+        misfit = 0.5 * max(as_recorded.cost - samples, 0.0)  # nats
+        if otherwise.evidence > as_recorded.evidence + THRESHOLDS.gain + THRESHOLDS.least_share * misfit:
             return True
     return False
 
 
-def _contacts_pull(fitted: Fit) -> bool:
-    """Whether any does along the fitted motion; where none does, one that never pulls is the same."""
+def _likely(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]]:
+    """The best first candidates, as another than the right one may have come first; where one leaves noise, those that
+    explain nearly as much."""
+    first = path.steps[0]
+    fitted = [one for one in first.as_recorded if one.fit]
+    if path.final.white:
+        fitted = [one for one in fitted if one.gain > (1.0 - THRESHOLDS.least_share) * fitted[0].gain]
+    for one in fitted[: THRESHOLDS.with_care]:
+        yield (*first.before.additions, as_found(one)), one.fit
+
+
+def _moves_otherwise(fitted: Fit, other: Structure) -> bool:
+    """Whether the contacts of the other structure push any body otherwise along the fitted motion."""
     problem = fitted.problem
-    never = problem.layout._replace(links=tuple(replace(link, damper_pulls=False) for link in problem.layout.links))
-    pairs = zip(problem.experiments, experiments_of(never, problem.records), fitted.trajectories, strict=True)
-    for pulling, pushing, trajectory in pairs:
-        rows = [linearise(experiment, fitted.theta, trajectory).rows for experiment in (pulling, pushing)]
+    contacts = {e.name: {"damper_pulls": e.damper_pulls, "acts_when_spent": e.acts_when_spent} for e in other.elements}
+    links = (replace(link, **contacts.get(link.name, {})) for link in problem.layout.links)
+    layout = problem.layout._replace(links=tuple(links))
+    pairs = zip(problem.experiments, experiments_of(layout, problem.records), fitted.trajectories, strict=True)
+    for one, changed, trajectory in pairs:
+        rows = [linearise(experiment, fitted.theta, trajectory).rows for experiment in (one, changed)]
         if not np.array_equal(*rows):
             return True
     return False

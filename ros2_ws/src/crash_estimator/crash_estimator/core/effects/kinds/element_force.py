@@ -11,6 +11,7 @@ import numpy as np
 from ..effect import Addition, Effect
 from ..estimator_model import ROUGHLY, coefficient_of, element_index, typical_motion, with_action
 
+IN_CURVE = "in_curve"
 HALF = 0.5
 """A coefficient's prior standard deviation carries this share of its target's largest force: as large as an effect
 that a model can lack and still be one of that crash; the evidence changes by ln 2 for a factor of two."""
@@ -21,28 +22,39 @@ class ElementForce(Effect):
     """A force in parallel to an element's own: c f, compression positive.
 
     force(motion: ElementMotion, **shape constants) -> (g,) N per unit of the coefficient
+
+    Variants, of a function of the crush alone on an element that unloads along a line of its own: it is a spring beside
+    that one (""), or a part of its curve, which unloads along the line ("in_curve").
     """
 
     force: Callable[..., np.ndarray] | None = None
-    of_crush_only: bool = False  # a function of the crush alone: a free curve of an elastic element contains it
     doubles: str = ""  # the element's own coefficient that says the same: none is offered where that is estimated
 
     function: ClassVar[str] = "force"
     in_parallel: ClassVar[bool] = True
+
+    @property
+    def variants(self):
+        return ("", IN_CURVE) if self.of_crush_only else ("",)
 
     def put_to_work(self, structure, test, spec):
         k, force = element_index(structure, spec.target), partial(self.force, **spec.shape)
         typical = typical_motion(structure, k)
         moved = np.abs(force(typical))
         scale = ROUGHLY * float(typical.static[0]) / float(moved[moved > 0.0][0] if moved.any() else 1.0)
-        return with_action(structure, spec, self.unit, "element", k, coefficient_of(spec, self), scale, force=force)
+        return with_action(
+            structure, spec, self.unit, "element", k, coefficient_of(spec, self), scale, force=force,
+            of_crush_only=self.of_crush_only, in_curve=spec.variant == IN_CURVE,
+        )  # fmt: skip
 
     def candidates(self, structure, magnitudes):
         for element in magnitudes.crushed_elements():
             free_curve = element.stiffness.estimated and element.stiffness.shape == "curve"
+            # a free curve of an elastic element contains a function of the crush alone
             contained = self.of_crush_only and free_curve and not element.unloading
             if not (contained or (self.doubles and getattr(element, self.doubles).estimated)):
-                yield from on_element(self, magnitudes, element.name)
+                for variant in self.variants if element.unloads and not free_curve else ("",):
+                    yield from on_element(self, magnitudes, element.name, variant)
 
     def prior_std(self, magnitudes, addition):
         element = magnitudes.element(addition.target)
@@ -52,9 +64,11 @@ class ElementForce(Effect):
         return HALF * magnitudes.force[element] / max(largest, 1e-12)
 
 
-def on_element(effect: Effect, magnitudes, element: str):
+def on_element(effect: Effect, magnitudes, element: str, variant: str = ""):
     """One addition for each combination of the starts of its shape constants."""
     names = list(effect.shapes)
     unit = [magnitudes.shape_unit(effect.shapes[name], element) for name in names]
     for values in product(*(effect.shapes[name].starts for name in names)):
-        yield Addition(effect, element, {n: v * u for n, v, u in zip(names, values, unit, strict=True)})
+        yield Addition(
+            effect, element, {n: v * u for n, v, u in zip(names, values, unit, strict=True)}, variant=variant
+        )

@@ -17,26 +17,37 @@ TYPICAL = 0.3
 
 @dataclass(frozen=True)
 class Gap(Effect):
-    """The coefficient is a crush that passes before the element carries anything; no tension."""
+    """The coefficient is a crush that passes before the element carries anything.
+
+    Its variants: it then carries compression only (""), or as much passes to either side ("play").
+    """
 
     changes_law: ClassVar[bool] = True
-    compression_only: ClassVar[bool] = True
+    variants: ClassVar[tuple[str, ...]] = ("", "play")
 
     def put_to_work(self, structure, test, spec):
         if spec.coefficient is None:
             raise to_be_given(structure, spec, f"its coefficient, in {self.unit}")
+        if spec.variant == "play":
+            return with_element(structure, spec.target, play=spec.coefficient)
         return with_element(structure, spec.target, origin=spec.coefficient, tension=False)
 
-    def changed_law(self, law, c):
-        return law._replace(gap=c, one_way=True)
+    def takes_tension_away(self, variant):
+        return variant != "play"
 
-    def law_derivative(self, on_line, lag, kx, kp):
-        return -np.where(on_line, kx + kp, kx)
+    def changed_law(self, law, c, variant):
+        return law._replace(gap=c, play=True) if variant == "play" else law._replace(gap=c, one_way=True)
+
+    def law_derivative(self, side, on_line, lag, kx, kp):
+        return -side * np.where(on_line, kx + kp, kx)
 
     def candidates(self, structure, magnitudes):
         for element in magnitudes.crushed_elements():
             largest = magnitudes.largest_crush(element.name)
-            yield from (Addition(self, element.name, coefficient=share * largest) for share in STARTS)
+            pulled = magnitudes.crush_range[magnitudes.element(element.name), 0] < -STARTS[0] * largest
+            for variant in self.variants if element.tension and pulled else ("",):
+                for share in STARTS:
+                    yield Addition(self, element.name, coefficient=share * largest, variant=variant)
 
     def prior_std(self, magnitudes, addition):
         return TYPICAL * magnitudes.crush[magnitudes.element(addition.target)]

@@ -24,7 +24,6 @@ class UnloadingSlope(Effect):
     """The coefficient is the slope of the line on which the element unloads from its peak; no tension."""
 
     changes_law: ClassVar[bool] = True
-    compression_only: ClassVar[bool] = True
     profiled: ClassVar[bool] = True
     replaces: ClassVar[str] = "unloading"
 
@@ -35,10 +34,13 @@ class UnloadingSlope(Effect):
         slope = replace(coefficient_of(spec, self), value=first)
         return with_element(structure, spec.target, unloading=None, unloading_slope=slope, tension=False)
 
-    def changed_law(self, law, c):
+    def takes_tension_away(self, variant):
+        return True
+
+    def changed_law(self, law, c, variant):
         return law._replace(unloads=True, slope=c, one_way=True)
 
-    def law_derivative(self, on_line, lag, kx, kp):
+    def law_derivative(self, side, on_line, lag, kx, kp):
         return np.where(on_line, lag, 0.0)
 
     def candidates(self, structure, magnitudes):
