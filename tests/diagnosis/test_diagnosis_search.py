@@ -89,8 +89,8 @@ def test_two_effects_are_found_of_which_neither_counts_alone():
 
 
 def test_what_is_not_white_in_the_sensors_noise_stays_unexplained_in_a_larger_one():
-    """A sensor that turns with its body, mimicked by an offset and a mass: the larger noise hides what they leave."""
-    found, _ = diagnosed("impactor", ("rotation",), 70619, 2.0)
+    """A sensor that turns with its body, mimicked by two effects: the larger noise hides what they leave."""
+    found, _ = diagnosed("impactor", ("rotation",), 70617, 2.0)
     assert found.verdict == "unexplained" and len(found.steps) == 2
 
 

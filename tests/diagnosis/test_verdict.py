@@ -14,7 +14,8 @@ from crash_estimator.core.diagnosis.report.ranking import Ranked
 from crash_estimator.core.diagnosis.report.tolerance import DEFAULT, Tolerance, tolerance_of
 from crash_estimator.core.diagnosis.report.verdict import Evidence, verdict_on
 from crash_estimator.core.diagnosis.residuals.score_test import Drift
-from crash_estimator.core.structure import ModelError
+from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.structure import Coefficient, ModelError
 from crash_estimator.model_file import load_model
 from crash_replay.bag import read_bag
 from crash_replay.conditioning import filter_recording
@@ -80,14 +81,16 @@ def test_a_tolerance_is_a_rating_or_a_share_of_the_peak():
 
 @pytest.fixture(scope="module")
 def frontal():
-    return diagnose(load_model("frontal_single"), [read_bag(FRONTAL)])
+    """Of a model without a damper, where nothing may be added but the simulator's unloading line."""
+    model = load_model("frontal_single")
+    undamped = replace(model, elements=(replace(model.elements[0], damping=Coefficient()),))
+    return diagnose(undamped, [read_bag(FRONTAL)], {"plastic_unloading": EFFECTS["plastic_unloading"]})
 
 
-def test_a_law_written_another_way_is_named_though_it_leaves_more_than_noise(frontal):
-    """The simulator's unloading is the thesis's; the model file knows of none."""
+def test_what_explains_most_is_named_though_it_leaves_more_than_noise(frontal):
     assert (frontal.verdict, frontal.complete, frontal.noise) == ("effect_missing", False, False)
     assert [(step.effect, step.target) for step in frontal.steps] == [("plastic_unloading", "car_barrier")]
-    assert abs(frontal.steps[0].coefficient / 2e7 - 1.0) < 0.1
+    assert abs(frontal.steps[0].coefficient / 2e7 - 1.0) < 0.2
     found = frontal.as_json()
     assert found["complete"] is False and found["left"]["noise"] is False
     assert found["tolerance"] == {"of_peak": 0.01, "rating": None, "stated": False}

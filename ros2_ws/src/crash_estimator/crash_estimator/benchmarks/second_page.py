@@ -37,7 +37,7 @@ noise are left, over both recordings, when the model's stiffnesses have taken wh
 decided by the simulated physics alone.
 
 The judging seeds start at {SEEDS:,}; nobody had looked at them before. On others, of which {LOOKED_AT} cases were
-looked at, the simulator was made and the search tuned; those from {DEVELOPMENT:,} on may be tuned on.""".replace(",0", " 0")
+looked at, the simulator was made and the search tuned; those from {DEVELOPMENT:,} on may be.""".replace(",0", " 0")
 
 
 class Judged(NamedTuple):

@@ -1,0 +1,92 @@
+"""Laws written in other forms than the first: found as such, written by `--apply`, and right when read back."""
+
+import numpy as np
+import pytest
+import yaml
+from helpers_paths import ROOT
+
+from crash_estimator.cli.work.diagnose import apply
+from crash_estimator.core.diagnosis import Diagnosis, diagnose
+from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.fold import run
+from crash_estimator.core.methods import make_estimator
+from crash_estimator.core.structure import ModelError, Structure
+from crash_estimator.model_file import ModelFile, load_model
+from crash_estimator.ready_models import model_path
+from crash_replay.bag import read_bag
+from crash_replay.recording import RecordingError
+from crash_replay.second_generator.cases import Drawn, case_of, drawn
+
+
+def found_in(name: str) -> tuple[Drawn, Diagnosis]:
+    """A development case of the second simulator, and what is said of it."""
+    case = drawn(case_of(name))
+    return case, diagnose(structure_of(case), case.recordings)
+
+
+def structure_of(case: Drawn) -> Structure:
+    return ModelFile.model_validate(yaml.safe_load(case.model_text)).structure()
+
+
+def written(found: Diagnosis, model: str, folder) -> Structure:
+    apply(found, (), EFFECTS, model, str(folder / "applied.yaml"))
+    return load_model(folder / "applied.yaml", EFFECTS)
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "contacts"),
+    [
+        ("side/gap.both/0.5g/clean/71700001", "play", "nothing"),
+        ("side/force.rising/1g/clean/71700002", "rising", "nothing"),
+        ("sled/cubic.inside/0.5g/clean/71700003", "in_curve", "nothing"),
+        ("wall/cubic.beside/0.5g/clean/71700004", "", "springs"),
+    ],
+)
+def test_the_form_of_a_law_is_found_and_can_be_read_back(name, form, contacts, tmp_path):
+    case, found = found_in(name)
+    (step,) = found.steps
+    assert found.verdict == "effect_missing" and found.complete
+    assert ((step.effect, step.target), step.form) == (case.right[0], form)
+    assert ("elastic forces that act on" in found.text) == (contacts == "springs")
+    given = tmp_path / "given.yaml"
+    given.write_text(case.model_text)
+    structure = written(found, str(given), tmp_path)
+    assert structure.effects[0].variant == form
+    target = [e for e in structure.elements if e.name == step.target]
+    assert all(element.acts_when_spent == contacts for element in target)
+    again = diagnose(structure, case.recordings)
+    assert again.verdict == "adequate" and "act on" not in again.text
+    for recording in case.recordings:  # and an estimator can follow it
+        estimator = make_estimator(structure, recording.test, "rls")
+        assert all(np.isfinite(estimate.parameters).all() for estimate in run(estimator, recording.samples()))
+
+
+def test_dampers_that_pull_until_the_crush_is_gone_are_those_of_our_own_bag(tmp_path):
+    """The simulator's dampers act both ways, and its springs unload along a line, of which the model file has none."""
+    bag = read_bag(ROOT / "bags" / "frontal_single.mcap")
+    found = diagnose(load_model("frontal_single"), [bag])
+    (step,) = found.steps
+    assert found.complete and (step.effect, step.target) == ("plastic_unloading", "car_barrier")
+    assert "all forces that act on, dampers' too" in found.text
+    structure = written(found, str(model_path("frontal_single")), tmp_path)
+    assert structure.elements[0].acts_when_spent == "all"
+    assert diagnose(structure, [bag]).verdict == "adequate"
+
+
+def ready_with(folder, old: str, new: str) -> Structure:
+    """The ready model frontal_single with other text in its file."""
+    file, text = folder / "model.yaml", model_path("frontal_single").read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+    return load_model(file, EFFECTS)
+
+
+def test_what_acts_where_a_spring_is_spent_is_one_of_three(tmp_path):
+    with pytest.raises(RecordingError, match="acts_when_spent.*'nothing', 'springs' or 'all'"):
+        ready_with(tmp_path, "tension: none", "tension: none\n    acts_when_spent: damper")
+
+
+def test_a_shape_constant_of_another_form_is_one_clear_error(tmp_path):
+    pushed = "effects:\n  - {type: constant_force, body: car, coefficient: 100.0, shape: {rise: 0.01}}\nelements:"
+    with pytest.raises(ModelError, match="no shape constant 'rise'; it has none"):
+        ready_with(tmp_path, "elements:", pushed)
