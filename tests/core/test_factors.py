@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.core.compiled.factors import product_of, widen
 from crash_estimator.core.compiled.kalman import kalman_update
+from crash_estimator.core.estimate import standard_deviations
 from crash_estimator.core.estimators.kalman import Kalman
 from crash_estimator.core.estimators.update import Theta
 from crash_estimator.core.methods import make_estimator
@@ -115,3 +116,7 @@ def test_both_forms_agree_on_the_vibration():
         states = first, second
         assert_allclose(a.parameters, b.parameters, rtol=1e-8, atol=1e-6)
         assert_allclose(a.covariance, b.covariance, rtol=1e-6)
+
+
+def test_a_variance_that_rounding_has_lost_states_no_sigma():
+    assert_allclose(standard_deviations(np.diag([4.0, 0.0, -1e-18])), [2.0, 0.0, np.nan])

@@ -1,8 +1,11 @@
 """Laws written in other forms than the first: found as such, written by `--apply`, and right when read back."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import yaml
+from crash_msgs.srv import AddEffect
 from helpers_paths import ROOT
 
 from crash_estimator.cli.work.diagnose import apply
@@ -10,8 +13,9 @@ from crash_estimator.core.diagnosis import Diagnosis, diagnose
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
-from crash_estimator.core.structure import ModelError, Structure
+from crash_estimator.core.structure import EffectSpec, ModelError, Structure
 from crash_estimator.model_file import ModelFile, load_model
+from crash_estimator.nodes.effect_requests import request_of, with_effect
 from crash_estimator.ready_models import model_path
 from crash_replay.bag import read_bag
 from crash_replay.recording import RecordingError
@@ -90,3 +94,16 @@ def test_a_shape_constant_of_another_form_is_one_clear_error(tmp_path):
     pushed = "effects:\n  - {type: constant_force, body: car, coefficient: 100.0, shape: {rise: 0.01}}\nelements:"
     with pytest.raises(ModelError, match="no shape constant 'rise'; it has none"):
         ready_with(tmp_path, "elements:", pushed)
+
+
+def test_a_request_to_a_running_estimator_names_the_form_as_a_model_file_does():
+    model, pushed = load_model("frontal_single"), EffectSpec("constant_force", "car", 100.0, {"rise": 0.01})
+    request = request_of(replace(pushed, variant="rising"))
+    assert "form=rising" in request.options
+    before = AddEffect.Request(
+        effect=request.effect,
+        target=request.target,
+        options=[option.replace("form=", "variant=") for option in request.options],  # as older bags have it
+    )
+    for one in (request, before):
+        assert with_effect(model, one).effects == (replace(pushed, variant="rising"),)

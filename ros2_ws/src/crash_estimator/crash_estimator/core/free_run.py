@@ -180,7 +180,7 @@ class _System:
 
     def force(self, element: int, law: Characteristic, motion: ElementMotion, memory: np.ndarray) -> float:
         """N, of an element at one instant."""
-        inside = self.inside(element, law, motion)
+        inside = self.inside(element, motion)
         spent = not law.carries(motion.crush, motion.peak, inside)
         lasting = self.structure.elements[element].acts_when_spent
         if spent and (lasting == NOTHING or motion.crush <= 0.0):
@@ -193,11 +193,11 @@ class _System:
         parallel, factor = beside_the_springs(self.structure, self.c, element, instant, memory, spent)
         return float(spring * factor[0] + damper + parallel[0])
 
-    def inside(self, element: int, law: Characteristic, motion: ElementMotion) -> float:
+    def inside(self, element: int, motion: ElementMotion) -> float:
         """N that effects add to an element's own curve where it is read."""
         if not any(action.in_curve for action in self.structure.actions):
             return 0.0
-        at = motion.crush if law.unloading is None else motion.peak
+        at = motion.peak if self.structure.elements[element].unloads else motion.crush
         return float(in_curve(self.structure.actions, self.c, element, np.array([at]))[0])
 
     def loads(self, t: float, state: _State) -> np.ndarray:

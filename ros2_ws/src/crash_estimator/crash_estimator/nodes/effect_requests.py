@@ -13,15 +13,15 @@ from ..core.effects.change import add_effect
 from ..core.effects.effect import Effect
 from ..core.structure import EffectSpec, ModelError, Structure
 
-WORDS = ("host", "touches", "taken_from", "variant")
-"""Options that are names; any other is a number."""
+WORDS = {"host": "host", "touches": "touches", "taken_from": "taken_from", "form": "variant"}
+"""Options that are names, as a model file writes them, and what an EffectSpec calls them; any other is a number."""
 
 
 def request_of(spec: EffectSpec) -> AddEffect.Request:
     """The request that adds just this effect; numbers keep all their digits."""
     numbers = {"coefficient": spec.coefficient} if spec.coefficient is not None else {}
     options = [f"{name}={float(value)!r}" for name, value in (numbers | dict(spec.shape)).items()]
-    options += [f"{name}={value}" for name in WORDS if (value := getattr(spec, name))]
+    options += [f"{name}={value}" for name, ours in WORDS.items() if (value := getattr(spec, ours))]
     return AddEffect.Request(effect=spec.type, target=spec.target, options=options)
 
 
@@ -57,8 +57,8 @@ def _options(request: AddEffect.Request) -> tuple[dict[str, str], dict[str, floa
     numbers: dict[str, float] = {}
     for option in request.options:
         name, _, text = option.partition("=")
-        if name in WORDS:
-            words[name] = text
+        if name in (*WORDS, "variant"):  # as it was said before it was called a form
+            words[WORDS.get(name, name)] = text
             continue
         try:
             numbers[name] = float(text)
