@@ -14,7 +14,7 @@ from crash_estimator.core.diagnosis.selection.acceptance import better
 from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
 from crash_estimator.core.diagnosis.selection.forward_selection import forward_selection
 from crash_estimator.core.diagnosis.selection.pruning import up_to_the_least_error
-from crash_estimator.core.diagnosis.selection.selection_step import selection_step
+from crash_estimator.core.diagnosis.selection.selection_step import in_recorded_noise, weighed
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.model_file import ModelFile
 from crash_replay.synthetic.hidden.cases import draw_case
@@ -67,7 +67,7 @@ def test_a_fit_is_no_better_than_the_motion_that_it_has_ended_in():
 def test_in_a_larger_noise_a_fit_does_not_end_further_from_what_was_measured_than_one_that_starts_closer():
     """From the measured motion the fit of this door goes astray; from the fit in the sensors' noise it does not."""
     magnitudes, model = fitted(*ROTATING_DOOR)
-    before = selection_step(magnitudes, EFFECTS, model).before
+    before = weighed(magnitudes, EFFECTS, in_recorded_noise(magnitudes, EFFECTS, model)).before
     assert before.fit.problem.noise_is_inflated
     start = before.fit.problem.narrowed(model.fit.layout, model.fit.point)
     assert not better(before.refitted(start, FROM_SIMULATION), before)

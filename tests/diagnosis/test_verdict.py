@@ -40,6 +40,7 @@ EVIDENCE = Evidence(1, False, STANDS_STILL, left(0.2, 10.0, 0.5), left(0.05, 2.0
 
 MENDED = {"after": left(0.04, 0.5)}
 """Where the model before leaves little."""
+LITTLE = left(0.009, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -58,7 +59,10 @@ MENDED = {"after": left(0.04, 0.5)}
         ({"ranking": (LEADER, ranked("clearance", "engine", 45.0))}, DEFAULT, "unexplained", False),
         ({"ranking": (LEADER, ranked("clearance", "engine", 45.0, fitted=False))}, DEFAULT, "effect_missing", False),
         ({"ranking": (LEADER, ranked("viscous_damping", "car_barrier", 49.0))}, DEFAULT, "effect_missing", False),
-        ({"added": 0, "after": left(0.009, 1.0)}, DEFAULT, "adequate", True),
+        ({"white": True, "by_first": 0.96}, DEFAULT, "effect_missing", False),  # of little weight beside that
+        ({"after": left(0.05, 6.0)}, DEFAULT, "unexplained", False),  # it explains two thirds
+        ({"added": 0, "before": LITTLE, "after": LITTLE}, DEFAULT, "adequate", True),
+        ({"before": LITTLE, "after": LITTLE}, DEFAULT, "adequate", True),  # what was added explains none of it
         ({"added": 0, "after": left(0.05, 1.0)}, DEFAULT, "unexplained", False),
         ({"before": left(0.04, 1.0), **MENDED}, DEFAULT, "effect_missing", False),
         ({"before": left(0.04, 1.0), **MENDED}, Tolerance(of_peak=0.05), "adequate", True),

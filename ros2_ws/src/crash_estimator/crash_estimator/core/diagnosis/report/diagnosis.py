@@ -15,9 +15,9 @@ from ..observation.pace import at_its_own_pace
 from ..observation.record import ObservedRecord, observe
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import free_run, noise_floor
-from ..residuals.score_test import Drift, drift_of
+from ..residuals.score_test import drift_of
 from ..selection.acceptance import share_removed
-from ..selection.assumptions import SelectionPath, first_believed, select
+from ..selection.assumptions import SelectionPath, first_believed, select, up_to
 from ..selection.fitted_model import Model
 from ..selection.selection_step import fit_of_all
 from ..selection.thresholds import THRESHOLDS
@@ -28,7 +28,7 @@ from .model_effects import structure_with
 from .ranking import Ranked, StepReport, ranking_of, step_of
 from .time_zero_step import TIME_ZERO, as_ranked, signals_begin, time_zero_step
 from .tolerance import DEFAULT, Tolerance
-from .verdict import Evidence, verdict_on
+from .verdict import ADEQUATE, Evidence, verdict_on
 from .verdict_text import verdict_text
 
 
@@ -107,7 +107,7 @@ def diagnose(
         records, zero, unused = _observed(structure, recordings, effects)
         path = first_believed(select(structure, records, effects))
         stopped = out_of_time()
-    found = _answer(structure, path, drift_of(path.as_recorded), tolerance, zero)
+    found = _answer(structure, path, tolerance, zero)
     remarks = [clipped] if clipped else []
     if unused:
         remarks.append(signals_begin({shift.test: shift.seconds for shift in unused}))
@@ -135,14 +135,12 @@ def _observed(
     return records, None, elsewhere
 
 
-def _answer(
-    structure: Structure, path: SelectionPath, drift: Drift, tolerance: Tolerance, zero: TimeZero | None
-) -> Diagnosis:
+def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zero: TimeZero | None) -> Diagnosis:
     band = band_of(path.final)
     given = zero.as_stated if zero else path.steps[0].before
     before = left_by(given, band)
     if tolerance.stated and tolerance.admits(before):  # whoever says so wants nothing added
-        path, zero = path._replace(steps=path.steps[:1], final=path.steps[0].before), None
+        path, zero = up_to(path, 0), None
     steps, final, present = path.steps, path.final, path.present
     models = tuple(step.before for step in steps)
     if models[-1] is not final:
@@ -152,6 +150,10 @@ def _answer(
     pairs = zip(steps, models, models[1:], zip(runs, runs[1:], strict=False), strict=False)  # the last has no successor
     of_all = fit_of_all(steps[: len(added)], final)
     reports = effects_added = tuple(step_of(*each, of_all) for each in list(pairs)[: len(added)])
+    drift = drift_of(path.as_recorded)
+    sure = next((k for k, one in enumerate(reports) if abs(one.coefficient) <= one.std), len(added))
+    if 0 < sure < len(added) and not (final.white and drift.constant):
+        return _answer(structure, up_to(path, sure), tolerance, zero)
     ranking, after = ranking_of(steps[0]), left_by(final, band)
     if zero:
         runs = [free_run(given.fit).rms, *runs]
@@ -161,10 +163,11 @@ def _answer(
     weighed = final.fit.problem.noise_is_inflated or after.share_explained(before) > THRESHOLDS.all_but_folds
     certain = all(abs(one.coefficient) > one.std for one in reports)
     many = len(added) or len(reports)  # a time zero is none of the effects that may be too many
-    with_first = steps[1].before if len(steps) > 1 else final
-    by_first = share_removed(steps[0].before.residuals, with_first.residuals) if added else 0.0
+    by_first = _removed_by_first_effect(path)
     evidence = Evidence(many, final.white, drift, before, after, ranking, weighed, certain, by_first)
     verdict = verdict_on(evidence, tolerance)
+    if added and verdict.word == ADEQUATE:
+        return _answer(structure, up_to(path, 0), tolerance, None)
     floor = noise_floor(given.fit.layout, given.records)
     return Diagnosis(
         verdict=verdict.word,
@@ -184,3 +187,11 @@ def _answer(
         structure=structure_with(path.structure, added, effects_added),
         models=models,
     )
+
+
+def _removed_by_first_effect(path: SelectionPath) -> float:
+    """Share of the misfit; what one element lacks another may as well, then the two count as one."""
+    effects = [addition.effect.name for addition in path.added]
+    alike = next((k for k, effect in enumerate(effects) if effect != effects[0]), len(effects))
+    models = [*(step.before for step in path.steps), path.final]
+    return share_removed(models[0].residuals, models[alike].residuals)

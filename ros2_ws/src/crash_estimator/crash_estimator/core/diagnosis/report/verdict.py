@@ -23,7 +23,7 @@ class Evidence(NamedTuple):
     ranking: Sequence[Ranked]  # of the first step
     weighed: bool  # the evidence was taken in a noise as large as what is left
     certain: bool  # every coefficient that was added is beyond its standard deviation
-    by_first: float = 0.0  # share of the misfit that the first effect alone removes
+    by_first: float = 0.0  # share of the misfit that the first effect removes, wherever it is missing
 
     @property
     def noise(self) -> bool:
@@ -37,35 +37,34 @@ class Verdict(NamedTuple):
 
 
 def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
-    """`adequate`: nothing significant is missing, or what is left is within the tolerance; `effect_missing`: what is
-    named beats its rivals and takes a large share of the misfit away; else `unexplained`."""
-    within = tolerance.admits(evidence.after)
+    """`adequate`: nothing significant is missing, or what is left of the model as given is within the tolerance and
+    nothing is named; `effect_missing`: what is named beats its rivals and takes a large share of the misfit away; else
+    `unexplained`."""
     if tolerance.stated and tolerance.admits(evidence.before):
         return Verdict(ADEQUATE, True)
     if evidence.noise:
         word = EFFECT_MISSING if evidence.added else ADEQUATE
         return Verdict(word if evidence.added <= THRESHOLDS.most_at_once else UNEXPLAINED, True)
-    if evidence.white or not _stands_still(evidence):  # it looks like noise, and varies with time: a mimic
-        return Verdict(UNEXPLAINED, False)
-    if not evidence.added:
-        return Verdict(ADEQUATE if within else UNEXPLAINED, within)
-    named = _explains(evidence) and (within or _beats_its_rivals(evidence.ranking))
-    return Verdict(EFFECT_MISSING, within) if named else Verdict(UNEXPLAINED, False)
+    within = tolerance.admits(evidence.after)
+    if _explains(evidence) and _stands_still(evidence) and (within or _beats_its_rivals(evidence.ranking)):
+        return Verdict(EFFECT_MISSING, within)
+    return Verdict(ADEQUATE, True) if tolerance.admits(evidence.before) else Verdict(UNEXPLAINED, False)
 
 
 def _stands_still(evidence: Evidence) -> bool:
-    """Most of what is left does not go along with a mass, a force or a gain that varies with time; or it is of so
-    little weight beside what one effect explains that it may be the form of that."""
+    """What is left does not go along with a mass, a force or a gain that varies with time: where it looks like noise,
+    as of a mimic, not at all, else not most of it; or it is of so little weight beside what one effect explains that it
+    may be the form of that."""
     of_little_weight = evidence.by_first > THRESHOLDS.all_but_folds
-    return of_little_weight or evidence.drift.constant or evidence.drift.share < THRESHOLDS.varying
+    little_of_it = not evidence.white and evidence.drift.share < THRESHOLDS.varying
+    return of_little_weight or evidence.drift.constant or little_of_it
 
 
 def _explains(evidence: Evidence) -> bool:
     """In the sensors' noise the evidence of what leaves more than that knows no doubt: it has to be weighed first."""
-    few = evidence.added <= THRESHOLDS.most_at_once
     return (
-        few
-        and evidence.weighed
+        0 < evidence.added <= THRESHOLDS.most_at_once
+        and (evidence.weighed or evidence.white)
         and evidence.certain
         and evidence.after.share_explained(evidence.before) > THRESHOLDS.named_share
     )

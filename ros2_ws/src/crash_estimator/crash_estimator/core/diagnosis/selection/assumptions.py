@@ -47,11 +47,16 @@ class SelectionPath(NamedTuple):
     present: int  # additions that the structure had
     as_recorded: Fit  # of the final model, in the sensors' noise
     records: Sequence[ObservedRecord]  # in the band that was compared
+    cells: int  # of the final model's curves
 
     @property
     def noise(self) -> bool:
         """The final model leaves nothing else, and nothing that varies with time."""
         return self.final.white and drift_of(self.as_recorded).constant
+
+    @property
+    def added(self) -> Sequence[Addition]:
+        return self.final.additions[self.present :]
 
     def rank(self) -> tuple[bool, float]:
         """Of paths under different assumptions the largest is believed."""
@@ -72,11 +77,17 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
 
 
 def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
+    """Under the contacts that the structure states, then under those that promise most, until none does."""
     path = _as_exact_as_needed(structure, records, effects)
-    for assumed in (never_pulling, elastic_when_spent, all_when_spent):
-        other = assumed(path.structure)
-        if other != path.structure and not out_of_time() and _may_be_explained_by(other, path, path.records):
-            path = max(path, _as_exact_as_needed(other, path.records, effects), key=SelectionPath.rank)
+    untried = [never_pulling, elastic_when_spent, all_when_spent]
+    while untried and not out_of_time():
+        promised = {assumed: _promised(assumed(path.structure), path, path.records) for assumed in untried}
+        best = max(untried, key=promised.get)
+        if promised[best] == -np.inf:
+            break
+        untried.remove(best)
+        otherwise = _as_exact_as_needed(best(path.structure), path.records, effects, path.added)
+        path = max(path, otherwise, key=SelectionPath.rank)
     return path
 
 
@@ -89,8 +100,14 @@ def first_believed(path: SelectionPath) -> SelectionPath:
     final = path.steps[most].before
     if path.final.white and share_removed(path.steps[0].before.residuals, final.residuals) < THRESHOLDS.all_but_folds:
         return path
+    return up_to(path, most)
+
+
+def up_to(path: SelectionPath, count: int) -> SelectionPath:
+    """With the first of its additions only."""
+    final = path.steps[count].before
     as_recorded = in_the_sensors_noise(final, path.records)
-    return path._replace(steps=path.steps[: most + 1], final=final, as_recorded=as_recorded)
+    return path._replace(steps=path.steps[: count + 1], final=final, as_recorded=as_recorded)
 
 
 def never_pulling(structure: Structure) -> Structure:
@@ -113,27 +130,29 @@ def _acting_when_spent(structure: Structure, what: str) -> Structure:
     return replace(structure, elements=tuple(replace(e, acts_when_spent=what) for e in structure.elements))
 
 
-def _may_be_explained_by(other: Structure, path: SelectionPath, records: Sequence[ObservedRecord]) -> bool:
-    """Something is missing, and contacts as they are assumed otherwise would explain some of it.
+def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedRecord]) -> float:
+    """Nats: the evidence of what was found, under contacts as they are assumed otherwise; -inf where nothing is
+    missing, where they would explain none of it, or less than what leaves noise already.
 
     Taken the wrong way, a damper that pulls looks like another effect.
     """
     final = path.final
-    if len(final.additions) == path.present and final.white:
-        return False
-    magnitudes = measure_magnitudes(other, records, CELLS)
+    if other == path.structure or (not path.added and final.white):
+        return -np.inf
+    magnitudes = measure_magnitudes(other, records, path.cells)
     samples = sum(record.bins * record.measured.shape[1] for record in records)
     models = [step.before for step in path.steps]
     models = models if models[-1] is final else [*models, final]
     found = ((model.additions, in_the_sensors_noise(model, records)) for model in models)
+    most = -np.inf
     for additions, as_recorded in chain(found, _likely(path)):
         if not _moves_otherwise(as_recorded, other):
             continue
         otherwise = fit_model(magnitudes, records, additions).fit
         misfit = 0.5 * max(as_recorded.cost - samples, 0.0)  # nats
         if otherwise.evidence > as_recorded.evidence + THRESHOLDS.gain + THRESHOLDS.least_share * misfit:
-            return True
-    return False
+            most = max(most, otherwise.evidence)
+    return most if not final.white or most > path.as_recorded.evidence else -np.inf
 
 
 def _likely(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]]:
@@ -162,24 +181,25 @@ def _moves_otherwise(fitted: Fit, other: Structure) -> bool:
 
 
 def _as_exact_as_needed(
-    structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]
-) -> SelectionPath:
+    structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect],
+    expected: Sequence[Addition] = (),
+) -> SelectionPath:  # fmt: skip
     """Masses and zeros are as stated, unless nothing but noise is left with errors of them such as scales and sensors
-    have: by the model as given, or with fewer effects than were found."""
+    have: by the model as given, or with fewer effects than were found. expected: found under other assumptions."""
     magnitudes, given = _as_given(structure, records, effects)
     if records[0].in_doubt:
-        return _with_curves_as_fine_as_needed(magnitudes, given, effects)
+        return _with_curves_as_fine_as_needed(magnitudes, given, effects, expected)
     doubted = magnitudes._replace(records=[record.doubted() for record in records])
     start, path = _in_doubt(doubted, given), None
     if not _leaves_noise(start):
-        path = _with_curves_as_fine_as_needed(magnitudes, given, effects)
+        path = _with_curves_as_fine_as_needed(magnitudes, given, effects, expected)
         models = [step.before for step in path.steps if step.before is not given]
         models += [] if path.steps[-1].before is path.final else [path.final]
         fewer = (_in_doubt(doubted, model) for model in models if not (model is path.final and path.noise))
         if out_of_time() or not any(map(_leaves_noise, fewer)):
             return path
         start = _in_doubt(doubted, path.steps[0].before)  # a candidate's fit may have shown a better one
-    other = _with_curves_as_fine_as_needed(doubted, start, effects)
+    other = _with_curves_as_fine_as_needed(doubted, start, effects, path.added if path else expected)
     if path is None or (other.noise and (not path.noise or len(other.steps) < len(path.steps))):
         return other
     return path
@@ -209,23 +229,25 @@ def _leaves_noise(model: Model) -> bool:
 
 
 def _with_curves_as_fine_as_needed(
-    magnitudes: Magnitudes, given: Model, effects: Mapping[str, Effect]
+    magnitudes: Magnitudes, given: Model, effects: Mapping[str, Effect], expected: Sequence[Addition]
 ) -> SelectionPath:
     structure, records, present = magnitudes.structure, magnitudes.records, given.additions
-    steps, final = forward_selection(magnitudes, effects, given)
+    steps, final = forward_selection(magnitudes, effects, given, expected)
+    cells = magnitudes.cells
     as_recorded = in_the_sensors_noise(final, records)
     finer = measure_magnitudes(structure, records, FINER_CELLS)
     mimicked = final.white and not drift_of(as_recorded).constant
     if not out_of_time() and _wants_finer_curves(final, mimicked, analyse(as_recorded), finer, len(present)):
-        finer_steps, finer_final = forward_selection(finer, effects, fit_model(finer, records, present))
+        found = final.additions[len(present) :]
+        finer_steps, finer_final = forward_selection(finer, effects, fit_model(finer, records, present), found)
         fewer = len(finer_final.additions) < len(final.additions) or not final.white
         if finer_final.white and (fewer or (mimicked and drift_of(finer_final.fit).constant)):
-            steps, final = finer_steps, finer_final
+            steps, final, cells = finer_steps, finer_final, finer.cells
             as_recorded = in_the_sensors_noise(final, records)
     steps, reported = up_to_the_least_error(steps, final, len(present))
     if reported is not final:
         final, as_recorded = reported, in_the_sensors_noise(reported, records)
-    return SelectionPath(structure, steps, final, len(present), as_recorded, records)
+    return SelectionPath(structure, steps, final, len(present), as_recorded, records, cells)
 
 
 def _wants_finer_curves(final: Model, mimicked: bool, residuals: Residuals, finer: Magnitudes, present: int) -> bool:

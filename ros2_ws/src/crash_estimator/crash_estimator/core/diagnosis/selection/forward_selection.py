@@ -1,44 +1,55 @@
 """Forward selection: fit the candidates, add the best, until nothing is left or nothing helps."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from ...effects.effect import Effect
+from ...effects.effect import Addition, Effect
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
 from .acceptance import better, explains_too_little, needed_gain
 from .candidate_fits import CandidateFit
 from .fitted_model import Model
-from .pair_search import two_at_once
+from .pair_search import as_expected, near_the_floor, two_at_once, two_of_one_effect
 from .pruning import up_to_the_least_error, without_the_superseded
-from .selection_step import SelectionStep, added, selection_step
+from .selection_step import SelectionStep, added, in_recorded_noise, weighed
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
 
 
 def forward_selection(
-    magnitudes: Magnitudes, effects: Mapping[str, Effect], given: Model
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], given: Model, expected: Sequence[Addition] = ()
 ) -> tuple[list[SelectionStep], Model]:
-    """All steps, and the last model; given: what it starts from."""
-    present = given.additions
-    path, final = _one_by_one(magnitudes, effects, given, [], len(present))
+    """All steps, and the last model; given: what it starts from, expected: what was found under other assumptions."""
+    present = len(given.additions)
+    pair, alike, first = as_expected(magnitudes, effects, given, expected), [], None
+    if pair is None:
+        first = in_recorded_noise(magnitudes, effects, given)
+        if not (first.leaves_noise or out_of_time()):
+            alike = two_of_one_effect(magnitudes, given, first.candidates)
+            pair = near_the_floor(alike, first.candidates)
+    if pair:
+        return _one_by_one(pair.magnitudes, effects, pair.model, pair.path, present)
+    path, final = _one_by_one(magnitudes, effects, given, [], present, first)
     if final.white or out_of_time():
         return path, final
-    pair = two_at_once(magnitudes, effects, given, path[0].as_recorded)
+    pair = two_at_once(magnitudes, effects, given, path[0].as_recorded, alike)
     if pair is None:
         return path, final
-    other = _one_by_one(pair.magnitudes, effects, pair.model, pair.path, len(present))
+    other = _one_by_one(pair.magnitudes, effects, pair.model, pair.path, present)
     if other[1].white:
         return other
-    paths = [up_to_the_least_error(*one, len(present)) for one in (other, (path, final))]
+    paths = [up_to_the_least_error(*one, present) for one in (other, (path, final))]
     return min(paths, key=lambda one: one[1].residuals.mean_square)
 
 
 def _one_by_one(
-    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: list[SelectionStep], present: int
-) -> tuple[list[SelectionStep], Model]:
-    """The best candidate is added as long as there is one; path: the steps that have led to the model."""
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: list[SelectionStep], present: int,
+    first: SelectionStep | None = None,
+) -> tuple[list[SelectionStep], Model]:  # fmt: skip
+    """The best candidate is added as long as there is one; path: the steps that have led to the model, first: the next
+    one in the sensors' noise, where it is known."""
     while not (path and out_of_time()):
-        done = selection_step(magnitudes, effects, model, path)
+        done = weighed(magnitudes, effects, first or in_recorded_noise(magnitudes, effects, model, path))
+        first = None
         path.append(done)
         fair = _without(model, done.best) if done.best and done.before is model else model
         if better(fair, model):

@@ -1,9 +1,10 @@
 """Two effects that only count together, because neither does while the other is missing."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from typing import NamedTuple
 
-from ...effects.effect import Effect
+from ...effects.effect import Addition, Effect
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
 from .acceptance import share_removed
@@ -20,17 +21,79 @@ class Pair(NamedTuple):
 
 
 def two_at_once(
-    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, candidates: Sequence[CandidateFit]
-) -> Pair | None:
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, candidates: Sequence[CandidateFit],
+    alike: Sequence[Pair],
+) -> Pair | None:  # fmt: skip
     """Where no effect counts for itself in noise as large as what it leaves: two that leave only the sensors'.
 
-    candidates: all of them, as recorded.
+    candidates: all of them, as recorded; alike: two of one effect.
     """
     found = [
         *_one_after_the_other(magnitudes, effects, model, candidates),
-        *_of_one_effect(magnitudes, model, candidates),
+        *(pair for pair in alike if pair.model.white or _all_but_folds(model, pair)),
     ]
     return max(found, key=lambda pair: (pair.model.white, pair.model.fit.evidence), default=None)
+
+
+def two_of_one_effect(magnitudes: Magnitudes, model: Model, candidates: Sequence[CandidateFit]) -> list[Pair]:
+    """What a model lacks on one element it may well lack on another: neither counts where the other is missing.
+
+    Of the likeliest effects, each where it explains most and at one more place.
+    """
+    alike: dict[str, list[CandidateFit]] = {}
+    for one in candidates:
+        if one.addition.effect.acts_on == "element":
+            alike.setdefault(one.addition.effect.name, []).append(one)
+    several = [places for places in alike.values() if len(places) > 1 and _likely(places[:1])]
+    found = []
+    for first, *others in several[: THRESHOLDS.with_care]:
+        larger = added(magnitudes, model.records, model, first)[1]
+        pairs = (_together(magnitudes, candidates, model, first, larger, o.addition) for o in others)
+        found += [pair for pair in islice(pairs, THRESHOLDS.most_hosts) if pair]
+    return found
+
+
+def as_expected(
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, expected: Sequence[Addition]
+) -> Pair | None:
+    """The first two that were found under other assumptions, where they leave next to nothing under these as well."""
+    if len(expected) < 2 or model.white:
+        return None
+    candidates = fit_candidates(magnitudes, effects, model)
+    first = next((one for one in _likely(candidates) if one.addition.key == expected[0].key), None)
+    if first is None:
+        return None
+    larger = added(magnitudes, model.records, model, first)[1]
+    pair = _together(magnitudes, candidates, model, first, larger, expected[1])
+    return near_the_floor([pair], candidates) if pair else None
+
+
+def _together(
+    magnitudes: Magnitudes, candidates: Sequence[CandidateFit], model: Model, first: CandidateFit, larger: Model,
+    second: Addition,
+) -> Pair | None:  # fmt: skip
+    """A second one beside the first, which the larger model has; None where it gains too little."""
+    both = fit_model(magnitudes, model.records, [*larger.additions, second])
+    gain = both.fit.evidence - larger.fit.evidence
+    if gain <= THRESHOLDS.gain_in_pair:
+        return None
+    rest = [one for one in candidates if one is not first]
+    last = CandidateFit(second, gain, both.fit)
+    path = [SelectionStep(model, [first, *rest], candidates), SelectionStep(larger, [last], [last])]
+    return Pair(magnitudes, both, path)
+
+
+def near_the_floor(pairs: Sequence[Pair], candidates: Sequence[CandidateFit]) -> Pair | None:
+    """The one that leaves next to nothing, where no candidate alone does."""
+    alone = min((analyse(one.fit).mean_square for one in _likely(candidates)[:1]), default=0.0)
+    best = min(pairs, key=lambda pair: pair.model.residuals.mean_square, default=None)
+    if best is None or alone < THRESHOLDS.near_floor:
+        return None
+    return best if best.model.residuals.mean_square < THRESHOLDS.near_floor else None
+
+
+def _all_but_folds(model: Model, pair: Pair) -> bool:
+    return share_removed(model.residuals, pair.model.residuals) > THRESHOLDS.all_but_folds
 
 
 def _likely(candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
@@ -51,20 +114,3 @@ def _one_after_the_other(magnitudes: Magnitudes, effects, model: Model, candidat
         if both.white:
             others = [one for one in candidates if one is not first]
             yield Pair(widest, both, [SelectionStep(model, [first, *others]), SelectionStep(larger, seconds)])
-
-
-def _of_one_effect(magnitudes: Magnitudes, model: Model, candidates) -> Iterator[Pair]:
-    """What a model lacks on one element it may well lack on another: neither counts where the other is missing."""
-    alike: dict[str, list[CandidateFit]] = {}
-    for one in candidates:
-        if one.addition.effect.acts_on == "element":
-            alike.setdefault(one.addition.effect.name, []).append(one)
-    for first, second in [ones[:2] for ones in alike.values() if len(ones) > 1 and _likely(ones[:1])]:
-        larger = added(magnitudes, model.records, model, first)[1]
-        both = fit_model(magnitudes, model.records, [*larger.additions, second.addition])
-        gain = both.fit.evidence - larger.fit.evidence
-        enough = both.white or share_removed(model.residuals, both.residuals) > THRESHOLDS.all_but_folds
-        if gain > THRESHOLDS.gain_in_pair and enough:
-            others = [one for one in candidates if one is not first]
-            last = CandidateFit(second.addition, gain, both.fit)
-            yield Pair(magnitudes, both, [SelectionStep(model, [first, *others]), SelectionStep(larger, [last])])

@@ -34,18 +34,25 @@ class SelectionStep(NamedTuple):
         first = self.candidates[0] if self.candidates else None
         return first if first and first.fit and first.gain > THRESHOLDS.gain else None
 
+    @property
+    def leaves_noise(self) -> bool:
+        """Only that, without an addition or with the best."""
+        return self.before.white or bool(self.best and analyse(self.best.fit).white)
 
-def selection_step(
+
+def in_recorded_noise(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: Sequence[SelectionStep] = ()
 ) -> SelectionStep:
-    """Candidates against the sensors' noise; where none leaves only that, against what the best of them leaves.
-
-    path: the steps before.
-    """
+    """All candidates against the sensors' noise; path: the steps before."""
     earlier = [one for step in path for one in step.candidates]
     found = fit_candidates(magnitudes, effects, model, thorough=True, earlier=earlier)
-    done = SelectionStep(model, found, found)
-    if model.white or (done.best and analyse(done.best.fit).white):
+    return SelectionStep(model, found, found)
+
+
+def weighed(magnitudes: Magnitudes, effects: Mapping[str, Effect], done: SelectionStep) -> SelectionStep:
+    """The step as it is where only noise is left, else against what the best candidate leaves."""
+    model, found = done.before, done.candidates
+    if done.leaves_noise:
         return done
     for _ in range(THRESHOLDS.inflations):
         if out_of_time():
