@@ -1,7 +1,7 @@
 """The samples of a test that have been seen, by their numbers, in whatever order and however often they came."""
 
 from collections.abc import Iterator
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,10 +20,10 @@ class Rows(NamedTuple):
         """Number after the last."""
         return self.number + len(self.time_ns)
 
-    def first(self, count: int) -> Self:
+    def first(self, count: int) -> "Rows":
         return Rows(self.number, self.time_ns[:count], self.values[:count])
 
-    def without(self, count: int) -> Self:
+    def without(self, count: int) -> "Rows":
         """All but the first `count`."""
         return Rows(self.number + count, self.time_ns[count:], self.values[count:])
 

@@ -27,7 +27,8 @@ def _block(block: Block, folder: Path) -> str:
         case Lines(text):
             return code_block(text)
         case Table(head, rows):
-            return markdown_table(*markdown_cells([head]), markdown_cells(rows))
+            (titles,) = markdown_cells([head])
+            return markdown_table(titles, markdown_cells(rows))
         case Figure(name, panels, columns, height):
             draw(folder / f"{name}.png", panels, columns, height)
             return f"![{name}]({name}.png)"

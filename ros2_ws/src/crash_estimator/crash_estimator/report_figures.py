@@ -45,7 +45,7 @@ def result_figures(structure: Structure, results: dict[str, Result]) -> list[Blo
         levels = [(band, "99 % of the noise"), (-band, "")]
         errors.append(Panel(f"{name}: error", "time in ms", shown, lines, levels))
         correlations += _correlations(k, results)
-    page = [
+    page: list[Block] = [
         Heading("Estimated outputs (figures 5.5, 5.12, 5.18)"),
         Figure("outputs", outputs),
         Figure("errors", errors),

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ def svg_panel(panel: Panel, height: int) -> str:
     x_range, y_range = _ranges(panel)
     right, bottom = WIDTH - RIGHT, height - BOTTOM
 
-    def at(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def at(x: Any, y: Any) -> tuple[Any, Any]:
         across = LEFT + (np.asarray(x) - x_range[0]) / (x_range[1] - x_range[0]) * (right - LEFT)
         up = bottom - (np.asarray(y) - y_range[0]) / (y_range[1] - y_range[0]) * (bottom - TOP)
         return across, np.clip(up, -1e4, 1e4)

@@ -105,7 +105,7 @@ def _records(file: Path, stream: BinaryIO) -> Iterator[McapRecord]:
         yield from breakup_chunk(replace(record, compression="", data=data), validate_crc=True)
 
 
-def _unpacked(chunk: Chunk, most: int) -> bytes | None:
+def _unpacked(chunk: Chunk, most: float) -> bytes | None:
     """The chunk's records, None where they are more than `most` bytes, whatever it says of itself."""
     if chunk.compression == "zstd":
         # as a stream: all at once it would make room for what the frame claims

@@ -84,8 +84,8 @@ def write_mcap(
         writer = BagWriter(stream, data_crc=True)
         for topic in topics:
             writer.add_topic(topic)
-        for topic, stamp, data in messages:
-            writer.write(topic, stamp, data, stamp)
+        for index, stamp, data in messages:
+            writer.write(index, stamp, data, stamp)
         return writer.finish(file.name)
 
 

@@ -51,6 +51,7 @@ def guarded(command: Callable[[], int | None], also: tuple[type[Exception], ...]
 
     also: exceptions that are no fault of the program either, with a message that can be read.
     """
+    readable: tuple[type[Exception], ...] = (Fault, *also)
     try:
         with _signals_end_it(), _no_signal_is_lost(), _threads_complain() as failed:
             return command() or (AT_FAULT if failed else DONE)
@@ -62,7 +63,7 @@ def guarded(command: Callable[[], int | None], also: tuple[type[Exception], ...]
         return INTERRUPTED
     except NobodyReads:
         return NOBODY_READS
-    except (Fault, *also) as error:
+    except readable as error:
         line = str(error)
     except OSError as error:
         line = _of_the_system(error)

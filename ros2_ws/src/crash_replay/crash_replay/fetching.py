@@ -6,6 +6,7 @@ by a node's own word, and has not come for a second, is not on its way any more.
 
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from crash_msgs.srv import GetEstimates, GetSamples
 from rclpy.node import Node
@@ -60,7 +61,7 @@ class Fetching:
             self.sources[name] = Source(client, self.account.samples, self._take_samples)
         for name in set(self.account.others.names(ESTIMATOR)) - set(self.sources):
             client = self.node.create_client(GetEstimates, f"{name}/get_estimates")
-            self.sources[name] = Source(client, lambda name=name: self.account.estimates(name), self._take_estimates)
+            self.sources[name] = Source(client, partial(self.account.estimates, name), self._take_estimates)
 
     def _look_at(self, name: str, source: Source) -> bool:
         gap, now = self._gap(name, source), time.monotonic()

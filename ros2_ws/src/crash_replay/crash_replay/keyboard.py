@@ -7,6 +7,7 @@ import sys
 import termios
 import tty
 from types import FrameType
+from typing import Any
 
 from .keys import decode
 
@@ -22,7 +23,7 @@ class Keyboard:
         self.descriptor = sys.stdin.fileno() if descriptor is None else descriptor
         self.rest = b""  # beginning of a key that is not complete
         self.before: list | None = None
-        self.handlers: dict[int, object] = {}
+        self.handlers: dict[int, Any] = {}
 
     def __enter__(self) -> "Keyboard":
         self.before = termios.tcgetattr(self.descriptor)

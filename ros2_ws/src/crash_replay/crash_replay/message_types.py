@@ -67,7 +67,7 @@ def decode_test(data: bytes) -> tuple[Test, int, int]:
     if wrong := limits.count_wrong("has", len(data), limits.MESSAGE):
         raise RecordingError(wrong)
     try:
-        message = typestore().deserialize_cdr(data, "crash_msgs/msg/TestInfo")
+        message: Any = typestore().deserialize_cdr(data, "crash_msgs/msg/TestInfo")
     except Exception as error:  # whatever the bytes make the decoder stumble over
         raise RecordingError(f"does not decode as crash_msgs/msg/TestInfo of this version ({error})") from None
     return test_from_msg(message), message.time_zero.sec * 1_000_000_000 + message.time_zero.nanosec, message.samples
@@ -90,7 +90,7 @@ def test_from_msg(message: Any) -> Test:
     )
 
 
-test_from_msg.__test__ = False  # not a pytest function
+test_from_msg.__test__ = False  # type: ignore[attr-defined]  # not a pytest function
 
 
 def _impact_ns(time_zero: Any) -> int:

@@ -47,7 +47,8 @@ def given_to(node: "Node") -> dict[str, Any]:
 
     It must have declared its overrides by itself, untyped: so what is wrong with one is said in our words.
     """
-    return {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
+    given: Mapping[str, Any] = node.get_parameters_by_prefix("")
+    return {name: parameter.value for name, parameter in given.items()}
 
 
 def declare_parameters(node: "Node", table: Mapping[str, Allowed]) -> dict[str, Any]:
@@ -106,7 +107,9 @@ def _fits(kind: type, value: Any) -> bool:
         return isinstance(value, int | float) and not isinstance(value, bool) and value == value
     if kind is list:
         return isinstance(value, list) and all(_fits(str, part) for part in value)
-    return type(value) is kind and (kind is not str or (value.isprintable() and len(value) <= TEXT.highest))
+    if kind is str:
+        return isinstance(value, str) and value.isprintable() and len(value) <= TEXT.highest
+    return type(value) is kind
 
 
 def _within(allowed: Allowed, value: Any) -> bool:

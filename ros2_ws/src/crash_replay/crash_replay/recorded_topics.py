@@ -75,7 +75,7 @@ class About(NamedTuple):
 
     run: int
     number: int
-    count: int
+    count: int  # type: ignore[assignment]  # hides the tuple's own method
 
 
 def about(data: bytes) -> About:

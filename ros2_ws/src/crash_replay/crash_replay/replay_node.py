@@ -187,7 +187,7 @@ def replay_beside(
     """
     prepare_middleware()
     # Ctrl-C must end the replay between two messages, not take the context away under it.
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=arguments and list(arguments), signal_handler_options=SignalHandlerOptions.NO)
     try:
         others = make_others()
         node = make()

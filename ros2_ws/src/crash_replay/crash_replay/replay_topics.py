@@ -2,6 +2,7 @@
 
 import time
 from functools import partial
+from typing import Any
 
 from crash_msgs.msg import Answer, ReplayState, Samples, TestInfo
 from rclpy.node import Node
@@ -35,7 +36,7 @@ class ReplayTopics:
             node.create_publisher(channel_type(c), f"channels/{c.name}", STREAM, qos_overriding_options=OVERRIDABLE)
             for c in recording.test.channels
         ]
-        overrides = node.get_parameters_by_prefix("qos_overrides")
+        overrides: dict[str, Any] = node.get_parameters_by_prefix("qos_overrides")
         depths = [parameter.value for name, parameter in overrides.items() if name.endswith(".depth")]
         who = partial(waited_for, node, [self.samples, *self.channels])
         self.flow = Flow(self._flowing, node.get_logger().warning, who, min([STREAM.depth, *filter(None, depths)]))

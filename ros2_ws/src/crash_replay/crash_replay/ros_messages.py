@@ -72,7 +72,7 @@ def decoded(data: bytes, kind: type) -> Any:
     raise RecordingError(f"does not decode as {kind.__name__}: {wrong}")
 
 
-test_to_msg.__test__ = False  # not a pytest function
+test_to_msg.__test__ = False  # type: ignore[attr-defined]  # not a pytest function
 
 
 def samples_to_msg(recording: Recording, start: int, stop: int, run: int, time_zero: int) -> Samples:

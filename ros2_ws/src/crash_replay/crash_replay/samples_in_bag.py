@@ -4,6 +4,7 @@ Samples are numbered: however many passes over the test were recorded, and in wh
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,7 @@ def read_samples(where: str, topic: Topic, channels: int, total: int) -> tuple[n
 
 def _read_message(where: str, data: bytes, channels: int, total: int) -> Sequence[np.ndarray]:
     try:
-        message = typestore().deserialize_cdr(data, SAMPLES_TYPE)
+        message: Any = typestore().deserialize_cdr(data, SAMPLES_TYPE)
     except Exception as error:  # whatever the bytes make the decoder stumble over
         raise RecordingError(f"{where}: does not decode as {SAMPLES_TYPE} of this version ({error})") from None
     number, times, values = int(message.number), message.time_ns, message.values

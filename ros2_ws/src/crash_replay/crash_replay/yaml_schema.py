@@ -1,6 +1,6 @@
 """YAML files checked against a pydantic model; what is wrong is said in one line with file, line and key."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from types import UnionType
@@ -82,7 +82,7 @@ def read_yaml(path: str | Path, model: type[Model]) -> Read:
         raise RecordingError(_message(path, tree, model, error)) from None
 
 
-def _message(path: Path, tree: Node, model: type[BaseModel], error: dict[str, Any]) -> str:
+def _message(path: Path, tree: Node, model: type[BaseModel], error: Mapping[str, Any]) -> str:
     """One line for one of pydantic's errors."""
     keys = _keys(tree, error["loc"])
     place = f"{path}:{_line(tree, keys)}"

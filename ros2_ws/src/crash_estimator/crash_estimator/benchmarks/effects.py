@@ -61,8 +61,8 @@ def _run(arguments: argparse.Namespace) -> None:
         if clocked:  # one after the other, with nothing beside them
             add_rows(in_processes(timed, clocked, 1), len(clocked), arguments.results, done, _outcome)
     rows = [done[c.name] for c in cases if c.name in done]
-    clocked = [done[f"time {c.name}"] for c in times if f"time {c.name}" in done]
-    write_markdown(to, [page(rows, clocked, len(cases), code())])
+    timings = [done[f"time {c.name}"] for c in times if f"time {c.name}" in done]
+    write_markdown(to, [page(rows, timings, len(cases), code())])
     say(f"{to}: {len(rows)} of {len(cases)} cases")
 
 

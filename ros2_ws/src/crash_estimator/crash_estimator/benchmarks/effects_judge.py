@@ -88,7 +88,7 @@ def right_first(row: dict) -> bool:
 
 def a_stop_for_a_gap(row: dict) -> bool:
     """The same law under its other name: a stop, with no stiffness left below it, where the hidden gap closes."""
-    first = row["ranking"][0] if _found(row) else {"key": [""]}
+    first: dict = row["ranking"][0] if _found(row) else {"key": [""]}
     if first["key"][0] != "bottoming_out":
         return False
     gaps = [h["coefficient"] for h in row["hidden"] if (h["effect"], h["target"]) == ("clearance", first["key"][1])]

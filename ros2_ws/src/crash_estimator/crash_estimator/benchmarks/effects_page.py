@@ -66,7 +66,9 @@ def _asked(drawn: Sequence[Judged], times: Sequence[dict]) -> str:
     ratios = [row["rms"][1] / row["rms"][2] for row in right]
     pulls = [abs(p) for row in right if (p := pull(row)) is not None]
     wrong = [j for j in one if _wrong(j.row)]
-    rows = [("right effect and target first, two recordings, 0.5 to 2 g", "98 %", _share(two, right_first))]
+    rows: list[tuple[str, str, Share | str]] = [
+        ("right effect and target first, two recordings, 0.5 to 2 g", "98 %", _share(two, right_first))
+    ]
     rows += [
         (f"at {noise:g} g", "98 %", _share([j for j in two if j.case.noise == noise], right_first)) for noise in NOISES
     ]

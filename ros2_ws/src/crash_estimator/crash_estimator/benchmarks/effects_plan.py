@@ -64,7 +64,7 @@ def plan(first_seed: int = SEEDS) -> tuple[Case, ...]:
     """All cases in a mixed order, so that any beginning of it is a sample of the whole; each has a seed of its own."""
     drawn = [*_vocabulary(), *_nothing(), *_outside(), *_pairs(), *_hard()]
     order = np.random.default_rng(0).permutation(len(drawn)).tolist()
-    return tuple(Case(*drawn[k], seed=first_seed + n) for n, k in enumerate(order))
+    return tuple(Case._make((*drawn[k], first_seed + n)) for n, k in enumerate(order))
 
 
 @cache

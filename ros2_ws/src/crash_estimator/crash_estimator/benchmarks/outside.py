@@ -30,8 +30,8 @@ HEAD = """# Recordings that nobody here made
 from models that lack what is to be found. The recordings do not come with the project. Error: RMS of what is left,
 in the band that the model speaks for, as given and with what was named; processor: seconds.
 
-All of these were looked at while the verdict's two numbers were chosen (half of the misfit explained, less than 0.45
-of the rest varying with time): they show what it says, and judge nothing.
+All of these were looked at while the verdict's two numbers were chosen (three quarters of the misfit explained, less
+than 0.45 of the rest varying with time): they show what it says, and judge nothing.
 """
 
 DAMPING_AT_RATIO_1 = 93.6
@@ -99,10 +99,10 @@ def judged(case: Case) -> list[str]:
     steps = "; ".join(f"{s.effect} on {s.target} {s.coefficient:.3g} +- {s.std:.2g} {s.unit}" for s in found.steps)
     rivals = found.ranking[0].confounded_with[:3] if found.ranking else ()
     told = f"`{found.verdict}`" + (f": {steps}" if steps else "") + (f" (or {', '.join(rivals)})" if rivals else "")
-    error = f"{found.left_before.rms / G:.3g} -> {found.left.rms / G:.3g} g, {found.left.band}"
+    errors = f"{found.left_before.rms / G:.3g} -> {found.left.rms / G:.3g} g, {found.left.band}"
     left = f"{100.0 * found.left.of_peak:.2g} %"
-    error += f"; {more}" if (more := case.besides(found)) else ""
-    return [case.name, case.truth, told, error, left, "yes" if case.right(found) else "NO", f"{seconds:.0f}"]
+    errors += f"; {more}" if (more := case.besides(found)) else ""
+    return [case.name, case.truth, told, errors, left, "yes" if case.right(found) else "NO", f"{seconds:.0f}"]
 
 
 def main() -> None:

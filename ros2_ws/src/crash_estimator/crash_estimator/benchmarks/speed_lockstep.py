@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from crash_msgs.srv import Burst
 from std_srvs.srv import Trigger
@@ -40,7 +41,12 @@ def recorded(graph: Graph, model: Path, bag: Path, file: Path, kill: bool) -> Pa
     for method in graph.names:
         graph.estimator(method, model, method)
     recorder = children.start("record", "crash_replay", "record", to=str(file), wait_for=len(graph.names))
-    quiet = {"progress": "false", "keyboard": "false", "wait_for": len(graph.names) + 1, "wait_timeout": 60.0}
+    quiet: dict[str, Any] = {
+        "progress": "false",
+        "keyboard": "false",
+        "wait_for": len(graph.names) + 1,
+        "wait_timeout": 60.0,
+    }
     replay = children.start(
         "replay", "crash_replay", "replay", bag=str(bag), block=1, lockstep=True, start_paused=kill, **quiet
     )

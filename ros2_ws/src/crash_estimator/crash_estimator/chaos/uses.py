@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from .case import RESTART, Case
 from .contents import recorded, says_incomplete
@@ -56,11 +57,15 @@ class Terminals:
         if DIAGNOSIS in also:
             commands[DIAGNOSIS] = node_command("crash_estimator", "diagnosis", model=model, every=RANKED_EVERY)
         if VIEWER in also:
-            shown = {"rrd": str(folder / RRD), "port": 0, "open": False}
+            shown: dict[str, Any] = {"rrd": str(folder / RRD), "port": 0, "open": False}
             commands[VIEWER] = node_command("crash_estimator", "viewer", estimators=[*ESTIMATORS], **shown)
         self.recording = folder / RECORDING
         commands[RECORD] = node_command("crash_replay", "record", to=str(self.recording), wait_for=len(ESTIMATORS))
-        asked = {"listeners": [*commands], "wait_timeout": WAITING + case.seconds, "rate": round(rate, 6)}
+        asked: dict[str, Any] = {
+            "listeners": [*commands],
+            "wait_timeout": WAITING + case.seconds,
+            "rate": round(rate, 6),
+        }
         commands[REPLAY] = node_command("crash_replay", "replay", bag=str(bag), **asked)
         self.members = [start(name, command) for name, command in commands.items()]
         self.replay_ended = 0.0

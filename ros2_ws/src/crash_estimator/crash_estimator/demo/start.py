@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from crash_replay.recording import Recording
 
@@ -102,15 +103,15 @@ def _start(
         for old in (rrd, rrd.with_suffix(".png")):
             old.unlink(missing_ok=True)  # an older one must not pass for this one
         models = list(dict.fromkeys(choice.model for choice in choices if choice.model.endswith((".yaml", ".yml"))))
-        viewer = dict(estimators=names, models=models or [""], rrd=str(rrd.absolute()), web=True)
+        viewer: dict[str, Any] = dict(estimators=names, models=models or [""], rrd=str(rrd.absolute()), web=True)
         children.start("viewer", "crash_estimator", "viewer", **viewer)
     if searches:
         same = [choice.name for choice in choices if choice.model == choices[0].model]
-        search = dict(model=choices[0].model, with_bags=[str(other) for other in others] or [""])
+        search: dict[str, Any] = dict(model=choices[0].model, with_bags=[str(other) for other in others] or [""])
         children.start("diagnosis", "crash_estimator", "diagnosis", add_first=True, estimators=same, **search)
     for choice in choices:
         parameters = dict(model=choice.model, method=choice.method)
         children.start(choice.name, "crash_estimator", "estimator", node=choice.name, **parameters)
     listeners = [*children.all, "demo"]
-    waiting = dict(listeners=listeners, wait_timeout=START_OF_REPLAY, finish_timeout=END_OF_REPLAY)
+    waiting: dict[str, Any] = dict(listeners=listeners, wait_timeout=START_OF_REPLAY, finish_timeout=END_OF_REPLAY)
     children.start("replay", "crash_replay", "replay", bag=str(bag), rate=rate, **waiting)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from crash_msgs.msg import ReplayState, Samples, TestInfo
 
@@ -96,7 +96,7 @@ def commands(folder: Path) -> dict[str, list[str]]:
     """Of all that listen to a replay, by their names; what viewer and record write is in the folder, made anew."""
     model, recorded = RECORDINGS[RECORDING].model, folder / "record.mcap"
     recorded.unlink(missing_ok=True)
-    picture = {"rrd": str(folder / "viewer.rrd"), "open": False, "port": 0, "memory_limit": SERVED}
+    picture: dict[str, Any] = {"rrd": str(folder / "viewer.rrd"), "open": False, "port": 0, "memory_limit": SERVED}
     return {
         "kalman": node_command("crash_estimator", "estimator", "kalman", model=model),
         "diagnosis": node_command("crash_estimator", "diagnosis", model=model, every=1.0),

@@ -13,7 +13,7 @@ class About(NamedTuple):
 
     run: int
     number: int
-    count: int
+    count: int  # type: ignore[assignment]  # hides the tuple's own method
 
     @property
     def end(self) -> int:

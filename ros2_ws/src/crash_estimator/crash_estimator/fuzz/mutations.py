@@ -145,8 +145,8 @@ def _spoilt_lines(rng: Random, content: bytes) -> bytes:
     return b"\n".join(lines)
 
 
-def spoilt_bytes(rng: Random, content: bytes) -> bytes:
-    content = bytearray(content)
+def spoilt_bytes(rng: Random, original: bytes) -> bytes:
+    content = bytearray(original)
     for _ in range(rng.choice((1, 1, 2, 8))):
         k = rng.randrange(len(content) + 1)
         match rng.randrange(6):

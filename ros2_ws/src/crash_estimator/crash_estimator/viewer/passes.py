@@ -4,6 +4,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 
 import rerun as rr
@@ -176,7 +177,7 @@ class Pass:
     def _meet(self, at_once: bool) -> None:
         """Begin once all expected estimators are known, or patience ends; take in who comes or changes later."""
         ready = [name for name, heads in self._heads.items() if heads.keys() == KINDS]
-        members = {name: self.attempt(lambda name=name: self._member(name)) for name in ready}
+        members = {name: self.attempt(partial(self._member, name)) for name in ready}
         present = [name for name in ready if members[name]]
         missing = self.test is None or any(name not in map(estimator_of, present) for name in self.expected)
         if not self.shows:

@@ -48,7 +48,7 @@ class Entry(NamedTuple):
     """What waits in the queue."""
 
     stream: Hashable  # None: not to be left out
-    index: int  # in its stream
+    index: int  # type: ignore[assignment]  # in its stream; hides the tuple's own method
     make: Make
     size: int  # bytes
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import rerun as rr
@@ -73,10 +74,10 @@ class Show:
     def write(self, items: Sequence[Block | EventBlock | Finding]) -> None:
         """What members of the cast and the diagnosis say, in the order it came; the more at a time, the cheaper."""
         for finding in (item for item in items if isinstance(item, Finding)):
-            self.attempt(lambda finding=finding: self._write_finding(finding))
+            self.attempt(partial(self._write_finding, finding))
         blocks = [item for item in items if not isinstance(item, (EventBlock, Finding))]
         for block in join(blocks):
-            self.attempt(lambda block=block: self._write_block(block))
+            self.attempt(partial(self._write_block, block))
         self.states.write_events([item for item in items if isinstance(item, EventBlock)])
         if blocks:
             self.summary.write(self.cast)

@@ -48,7 +48,9 @@ def assemble(client: PoliteClient, number: int, folder: Path) -> None:
     Raises RecordingError (Unreachable where the server is silent) where there is no such test or no curve of it.
     """
     metadata = _metadata(client, number)
-    rows = [row for row in metadata.get("INSTRUMENTATION") or () if isinstance(row, Mapping)]
+    rows: Sequence[Mapping[str, Any]] = [
+        row for row in metadata.get("INSTRUMENTATION") or () if isinstance(row, Mapping)
+    ]
     rows = rows or _instrumentation(client, number)
     if not rows:
         raise RecordingError(f"nhtsa:{number}: the database has neither a package nor curves of this test")
@@ -138,7 +140,7 @@ def _two_columns(text: bytes, row: Mapping[str, Any], what: str) -> str:
         raise RecordingError(f"{what}: expected columns of numbers: {limits.shown(str(error))}") from None
     if table.shape[1:] not in ((1,), (2,)) or not len(table):
         raise RecordingError(f"{what}: expected one or two columns, found {table.shape[1:] or 'none'}")
-    times = table[:, 0] if table.shape[1] == 2 else np.zeros(len(table))
+    times: np.ndarray = table[:, 0] if table.shape[1] == 2 else np.zeros(len(table))
     if len(times) < 2 or np.ptp(times) == 0.0:
         times = (_number(row, "NFP") + np.arange(len(table))) * _number(row, "DELT") * 1e-6
     return "".join(f"{t:.9g}\t{v:.9g}\n" for t, v in zip(times, table[:, -1]))

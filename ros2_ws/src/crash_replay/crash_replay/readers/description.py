@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
@@ -27,7 +27,7 @@ class Part(BaseModel):
 
 
 class TestPart(Part):
-    id: str | None = Field(None, coerce_numbers_to_str=True)
+    id: str | None = Field(default=None, coerce_numbers_to_str=True)
     title: str = ""
     source: str = ""
     date: Annotated[str, BeforeValidator(str)] = ""  # and time, UTC; YAML reads most dates as what they are
@@ -78,7 +78,7 @@ def apply_names(recording: Recording, path: Path) -> Recording:
     channels = tuple(_renamed(channel, given[channel], sign) for channel, sign in zip(test.channels, signs))
     stated = {body: -v if body in turned and v else v for body, v in test.initial_velocity.items()}
     inherited = {new.body: stated[old.body] for old, new in zip(test.channels, channels) if old.body in stated}
-    changed = dict(
+    changed: dict[str, Any] = dict(
         id=names.test.id or test.id,
         title=names.test.title or test.title,
         source=names.test.source or test.source,

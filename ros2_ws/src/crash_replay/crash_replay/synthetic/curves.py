@@ -3,6 +3,8 @@
 from bisect import bisect_right
 from collections.abc import Sequence
 
+import numpy as np
+
 
 class Curve:
     """Monotone cubic interpolation between knots, constant beyond both ends.
@@ -13,7 +15,7 @@ class Curve:
     integrator needs, and twenty times faster than scipy's own call.
     """
 
-    def __init__(self, x: Sequence[float], y: Sequence[float]):
+    def __init__(self, x: Sequence[float] | np.ndarray, y: Sequence[float] | np.ndarray):
         from scipy.interpolate import PchipInterpolator  # late: it takes longer to import than all the rest
 
         if len(x) != len(y) or len(x) < 2:

@@ -15,7 +15,7 @@ from .forces import Law, Slip
 class Motion:
     """Forced motion of a driven body: its velocity as a cubic spline through knots at s, m/s, steady at both ends."""
 
-    def __init__(self, time: Sequence[float], velocity: Sequence[float]):
+    def __init__(self, time: Sequence[float] | np.ndarray, velocity: Sequence[float] | np.ndarray):
         from scipy.interpolate import CubicSpline  # late, as in curves.py
 
         self.time, self.velocity = tuple(map(float, time)), tuple(map(float, velocity))

@@ -25,10 +25,10 @@ def random_curve(rng: np.random.Generator, stiffness: float, crush: float) -> Cu
     if abrupt:
         slopes[rng.integers(1, parts)] *= rng.choice(ABRUPT_SLOPES)
     x = np.concatenate([[0.0], np.cumsum(lengths)])
-    y = [0.0]
+    heights = [0.0]
     for rise in slopes * lengths:
-        y.append(max(y[-1] + rise, 0.5 * y[-1]))
-    y = np.array(y)
+        heights.append(max(heights[-1] + rise, 0.5 * heights[-1]))
+    y = np.array(heights)
     x, y = np.append(x / x[-1], 4.0) * crush, np.append(y / y[-1], 4.0) * stiffness * crush
     if abrupt:
         half = min(CORNER, 0.2 * float(np.min(np.diff(x))))
