@@ -65,7 +65,7 @@ class Estimate(NamedTuple):
     innovation: np.ndarray  # (q,) measured minus predicted before the update
     innovation_covariance: np.ndarray  # (q, q)
     residual: np.ndarray  # (q,) measured minus predicted after the update
-    residual_std: np.ndarray  # (q,)
+    residual_std: np.ndarray  # (q,) innovation's where nothing was updated; NaN where no noise is known
     crush: np.ndarray  # (e,) m
     rate: np.ndarray  # (e,) m/s
     force: np.ndarray  # (e,) N, compression positive

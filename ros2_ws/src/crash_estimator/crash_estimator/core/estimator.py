@@ -85,15 +85,16 @@ class Estimator:
         damping = state.update.theta[self.regressor.damping_index]
         inside = self.regressor.inside(state.update.theta, motion, state.contact.peak_crush)
         contact, law, events = self.contact.step(state.contact, motion, stiffness, unloading, damping, inside)
-        regression, forces = self.regressor.make(motion, law, state.update.theta, state.update.variance)
+        regression, forces = self.regressor.make(motion, law, state.update.theta, np.diagonal(state.update.stated))
         method, update = state.method, state.update
         if motion.dt > 0.0 and self._excited(regression):
             method, update = self.method.update(method, regression)
             events += update.events + self._clamp_events(state.update.clamped, update)
         else:
-            noise = np.diag(np.nan_to_num(regression.noise))
-            nothing = np.zeros_like(update.clamped)
-            update = update._replace(clamped=nothing, innovation_covariance=noise, events=(), expected_error=(0.0, 0.0))
+            update = update._replace(
+                clamped=np.zeros_like(update.clamped), innovation_covariance=np.diag(np.nan_to_num(regression.noise)),
+                events=(), expected_error=(0.0, 0.0), residual_variance=regression.noise,
+            )  # fmt: skip
         dropped, drop_events = self._dropouts(state.dropped, motion)
         status = self.regressor.status(law, update.clamped)
         estimate = self._estimate(
@@ -138,10 +139,9 @@ class Estimator:
         unknown = (float("nan"),) * len(self.description.extra)
         predicted = regression.known + regression.gradient @ update.theta + update.expected_error[1]
         before = regression.known + regression.gradient @ theta_before + update.expected_error[0]
-        # the part of the innovation that the update did not explain: R S^-1 R for an optimal gain, at most S
-        spread = regression.gradient @ update.covariance @ regression.gradient.T
-        residual_variance = np.maximum(np.diagonal(update.innovation_covariance) - np.diagonal(spread), 0.0)
-        covariance = update.covariance + update.beside
+        left = update.residual_variance
+        left = np.diagonal(update.innovation_covariance) if left is None else left
+        covariance = update.stated
         return Estimate(
             number=sample.number,
             time_ns=sample.time_ns,
@@ -153,7 +153,7 @@ class Estimator:
             innovation=motion.measured - before,
             innovation_covariance=update.innovation_covariance,
             residual=motion.measured - predicted,
-            residual_std=np.sqrt(residual_variance),
+            residual_std=np.sqrt(np.maximum(left, 0.0)),
             crush=motion.crush,
             rate=motion.rate,
             force=forces.per_unit @ update.theta + forces.shift,

@@ -90,6 +90,16 @@ class Further:
         return secant
 
 
+def drift_of(parameter: Parameter) -> float:
+    """Standard deviation of the parameter's random walk, a share of its value, per e-fold of crush."""
+    coefficient = parameter.coefficient
+    if not coefficient.estimated:
+        return 0.0
+    if coefficient.drift is not None:
+        return coefficient.drift
+    return DRIFT[coefficient.shape] if parameter.is_stiffness else 0.0
+
+
 class Regressor:
     """Turns motion and contact into the regression."""
 
@@ -125,21 +135,12 @@ class Regressor:
         )
         lasting = np.array([outlasts(element.acts_when_spent) for element in structure.elements], dtype=bool)
         self.outlasts = ~self.of_spring & lasting[self.element]
-        self.drift_squared = np.array([self._drift(p) ** 2 for p in parameters])
+        self.drift_squared = np.array([drift_of(p) ** 2 for p in parameters])
         self.every = tuple(  # of all parameters, the actions' too: element, is_stiffness, estimated
             np.array(column)
             for column in zip(*((p.element, p.is_stiffness, p.coefficient.estimated) for p in structure.parameters))
         )
         self.noise = np.array([structure.bodies[k].noise or np.nan for k in structure.equations]) ** 2
-
-    @staticmethod
-    def _drift(parameter: Parameter) -> float:
-        coefficient = parameter.coefficient
-        if not coefficient.estimated:
-            return 0.0
-        if coefficient.drift is not None:
-            return coefficient.drift
-        return DRIFT[coefficient.shape] if parameter.is_stiffness else 0.0
 
     def make(
         self, motion: Motion, law: SpringLaw, theta: np.ndarray, variance: np.ndarray | float = 0.0

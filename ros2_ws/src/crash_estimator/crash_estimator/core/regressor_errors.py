@@ -31,8 +31,19 @@ chapter VIII). N is known beforehand: with q = s^2 dt, the noise's spectral dens
 A measured force has a zero as well, and no motion: its body is the fixed one that it acts on. The noise is taken as
 white; that of a filtered channel is not, and its sigmas come out too small.
 
-The lag: a method with a memory takes theta as constant within it. Where the model says that theta walks (`drift`), what
-a step of that walk adds is lost to the method until it has followed:  S <- S + diag(walk theta^2)  at every sample.
+The lag: a method with a memory takes theta as constant within it. Where the model says that theta walks (`drift`), a
+filter beside it that lets theta walk (`estimators/lag.py`) knows, with C its covariance and its errors of the motion,
+
+    true theta - theta of the method ~ N(d, C)      d = theta of the filter - theta of the method
+
+A part of the error that is known and not corrected is no noise. 95 % lie within |d| + 1.645 s, s^2 = C_jj, where d is
+larger than s (all that is outside is on one side), and within 1.96 s where it is nothing; a sigma is stated so that
+1.96 of it reach there (of uncorrected bias: Phillips, Eberhardt and Parry 1997, J. Res. NIST 102, 577):
+
+    1.96 sigma_j = max(1.96 s_j, |d_j| + 1.645 s_j)     covariance = C + l l',  l_j = sign(d_j) (sigma_j^2 - s_j^2)^1/2
+
+That is less than the root mean square, (s^2 + d^2)^1/2, where d is the larger part; it says nothing of the method's own
+noise, which is in d.
 
 The setting `regressor_errors` of each method switches all of it off, and `KNOWN_FROM` with it: the motion is then taken
 as true, as the thesis takes it.
@@ -51,6 +62,10 @@ and what may be wrong with that is counted as the error of the others (a paramet
 
 SMALLEST_SHARE = 0.05
 """Of a parameter's scale: a walk is a share of the value, and a stiffness near zero must be able to walk as well."""
+
+
+TWO_SIDED, ONE_SIDED = 1.96, 1.645
+"""Standard deviations within which, and below which, 95 % of a normal error lie."""
 
 
 class MotionErrors(NamedTuple):
@@ -81,7 +96,7 @@ class MotionErrors(NamedTuple):
 
 
 class Consequence(NamedTuple):
-    """What the errors of the motion, and the lag, have made of theta so far: w parameters, b bodies."""
+    """What the errors of the motion have made of theta so far: w parameters, b bodies."""
 
     covariance: np.ndarray  # (w, w) S
     shared: np.ndarray  # (w, b, 3) C
@@ -110,6 +125,14 @@ class Consequence(NamedTuple):
         if errors is not None:
             pulled[:, :, 1] += h[:, :, 0] * errors.density
         return Consequence(0.5 * (s + s.T), shared + np.einsum("wq,qbk->wbk", gain, pulled), time)
+
+
+def late(behind: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """(p, p) that is stated of a theta (p,) which is `behind` d of a filter's, of covariance C (p, p)."""
+    s = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    reach = np.maximum(s, (np.abs(behind) + ONE_SIDED * s) / TWO_SIDED)
+    more = np.copysign(np.sqrt(np.maximum(reach**2 - s**2, 0.0)), behind)
+    return covariance + np.outer(more, more)
 
 
 def none_yet(parameters: int, bodies: int) -> Consequence:

@@ -52,6 +52,9 @@ class CompiledEstimator:
         memory[fields["information"]] = np.diag(1.0 / plan.std**2).ravel()
         memory[fields["carried"]] = np.diag(plan.std**2).ravel()
         memory[fields["gamma"]] = 1.0
+        memory[fields["stated"]] = memory[fields["covariance"]]
+        memory[fields["walking"]] = plan.initial
+        memory[fields["walking_noise"]] = np.nan
         last_row = np.zeros(self._row_length)
         last_row[self.columns["state"]] = ElementState.APART
         return CompiledState(memory, last_row)

@@ -63,6 +63,7 @@ def follow(whole, others, state, last_row, times_ns, values, rows):
             row.innovation_covariance[:, :] = 0.0
             for i in range(q):
                 row.innovation_covariance[i, i] = learnt[i] if learnt[i] == learnt[i] else 0.0
+                row.residual_std[i] = np.sqrt(learnt[i])
         _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped)
         row.news[0] = _news(row, previous)
         last_row[:] = latest
@@ -79,7 +80,7 @@ def _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped):
             row.parameters[j], row.std[j], row.status[j] = plan.value[j], 0.0, KNOWN
             continue
         row.parameters[j] = s.theta[slot]
-        row.std[j] = np.sqrt(s.covariance[slot, slot] + s.beside[slot, slot])
+        row.std[j] = np.sqrt(s.stated[slot, slot])
         status = ESTIMATED
         if row.state[k] == APART:
             status = SEPARATE
@@ -90,21 +91,16 @@ def _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped):
         row.status[j] = status
     for j in range(n.estimated):
         for h in range(j + 1):
-            row.covariance[j, h] = row.covariance[h, j] = s.covariance[j, h] + s.beside[j, h]
+            row.covariance[j, h] = row.covariance[h, j] = s.stated[j, h]
     for i in range(q):
         predicted = expected = known[i]
-        spread = 0.0
         for j in range(p):
             predicted += gradient[i, j] * s.theta[j]
             expected += gradient[i, j] * before[j]
-        for j in range(n.estimated):
-            for h in range(n.estimated):
-                spread += gradient[i, j] * s.covariance[j, h] * gradient[i, h]
         row.predicted[i] = predicted
         row.innovation[i] = row.measured[i] - expected
         row.residual[i] = row.measured[i] - predicted
         row.innovation_std[i] = np.sqrt(row.innovation_covariance[i, i])
-        row.residual_std[i] = np.sqrt(max(row.innovation_covariance[i, i] - spread, 0.0))
     for k in range(len(shift)):
         row.force[k] = shift[k]
         row.force_std[k] = 0.0

@@ -12,6 +12,8 @@ the update of all, which factors take, and a square added for those that are hel
 12-619).
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -75,17 +77,21 @@ def _one_equation(theta, factors, r, gradient, target, free, clamped, psi, sprea
     add_square(factors, 1.0 / s, spread, last)
 
 
+class Filter(NamedTuple):
+    """What one filter has of the state; w: its parameters, and errors of zero offsets."""
+
+    theta: np.ndarray  # (w,)
+    factors: np.ndarray  # (w, w)
+    noise: np.ndarray  # (q,) R2
+    beside: np.ndarray  # (w, w)
+    shared: np.ndarray  # (3, b, w)
+
+
 @njit(cache=True, inline="always")
 def kalman_step(
     plan, method, n, s, row, dt, known, gradient, by_errors, errors, active, walk, learnt, target, clamped
 ):  # fmt: skip
-    """Random walk, update, and adaptation of R2 to what the model cannot follow."""
-    p, q = len(s.theta), len(known)
-    unit, through = np.empty(p), np.empty((q, p))
-    for j in range(n.estimated):
-        size = max(abs(s.theta[j]), SMALLEST_SHARE * plan.scale[j])
-        if walk[j] > 0.0:
-            widen(s.factors, walk[j] * size**2, j, unit)
+    """The zero offsets' errors where they are estimated, and a step of the filter."""
     if n.offsets and np.isnan(s.noise[0]):
         count = s.count.max()
         for b in range(n.offsets):
@@ -93,27 +99,72 @@ def kalman_step(
             s.factors[n.estimated + b, n.estimated + b] = variance
             if count >= FEWEST:
                 s.beside[n.estimated + b, n.estimated + b] = s.squares[b] / count**2 - variance
-    for i in range(q):
-        if np.isnan(s.noise[i]):
-            s.noise[i] = learnt[i] if learnt[i] == learnt[i] else 1.0
+    for i in range(len(known)):
         target[i] = row.measured[i] - known[i]
-    seen_through(s.factors, gradient, s.noise, through, row.innovation_covariance)
-    before, gain = s.theta.copy(), np.empty((p, q))
+    filtered(
+        plan, method, Filter(s.theta, s.factors, s.noise, s.beside, s.beside_shared), dt, gradient, by_errors, errors,
+        active, walk, learnt, target, clamped, row.innovation_covariance, row.residual_std,
+    )  # fmt: skip
+    product_of(s.factors, s.covariance)
+    for j in range(n.estimated):
+        for k in range(n.estimated):
+            s.stated[j, k] = s.covariance[j, k] + s.beside[j, k]
+
+
+@njit(cache=True)
+def filtered(
+    plan, method, f, dt, gradient, by_errors, errors, active, walk, learnt, target, clamped, innovation_covariance,
+    residual_std,
+):  # fmt: skip
+    """Random walk, update, and adaptation of R2 to what the model cannot follow."""
+    p, q = len(f.theta), len(target)
+    unit, through = np.empty(p), np.empty((q, p))
+    for j in range(len(walk)):
+        size = max(abs(f.theta[j]), SMALLEST_SHARE * plan.scale[j])
+        if walk[j] > 0.0:
+            widen(f.factors, walk[j] * size**2, j, unit)
+    for i in range(q):
+        if np.isnan(f.noise[i]):
+            f.noise[i] = learnt[i] if learnt[i] == learnt[i] else 1.0
+    seen_through(f.factors, gradient, f.noise, through, innovation_covariance)
+    before, gain = f.theta.copy(), np.empty((p, q))
     kalman_update(
-        s.theta, s.factors, s.noise, gradient, target, active, plan.lower, plan.upper, method.constrained, clamped, gain
+        f.theta, f.factors, f.noise, gradient, target, active, plan.lower, plan.upper, method.constrained, clamped, gain
     )
     for i in range(q):
         if target[i] == target[i]:
-            pass_one(s.beside, s.beside_shared, gain[:, i], gradient[i], by_errors[:, i], errors, unit)
-    product_of(s.factors, s.covariance)
+            pass_one(f.beside, f.shared, gain[:, i], gradient[i], by_errors[:, i], errors, unit)
+    _left(f, gradient, gain, target, through, residual_std)
     if method.noise_memory > 0.0:
         share = dt / (dt + method.noise_memory)
         for i in range(q):
             residual, innovation = target[i], target[i]
             for j in range(p):
-                residual -= gradient[i, j] * s.theta[j]
+                residual -= gradient[i, j] * f.theta[j]
                 innovation -= gradient[i, j] * before[j]
             product = residual * innovation
             if product == product:
-                s.noise[i] += share * (max(product, 0.0) - s.noise[i])
-            s.noise[i] = max(s.noise[i], learnt[i] if learnt[i] == learnt[i] else QUIETEST**2)
+                f.noise[i] += share * (max(product, 0.0) - f.noise[i])
+            f.noise[i] = max(f.noise[i], learnt[i] if learnt[i] == learnt[i] else QUIETEST**2)
+
+
+@njit(cache=True)
+def _left(f, gradient, gain, target, through, residual_std):
+    """`residual_variance` of estimators/update.py, its root; gain (w, q) becomes the influence of each equation."""
+    q, w = gradient.shape
+    spread = np.empty((q, q))
+    seen_through(f.factors, gradient, f.noise, through, spread)  # R2 is in it
+    for i in range(q):
+        if target[i] != target[i]:
+            continue
+        for k in range(i):
+            met = 0.0
+            for j in range(w):
+                met += gradient[i, j] * gain[j, k]
+            for j in range(w):
+                gain[j, k] -= gain[j, i] * met
+    for i in range(q):
+        own = 0.0
+        for j in range(w):
+            own += gradient[i, j] * gain[j, i]
+        residual_std[i] = np.sqrt(max(spread[i, i] - 2.0 * own * f.noise[i], 0.0))

@@ -55,9 +55,14 @@ def state_fields(size: Size) -> dict[str, tuple[int, ...]]:
         "window_error": (m, q),
         "window_influence": (m, p, q),
         "window_variance": (m, q),
-        "beside": (p + n, p + n),  # what errors of the motion, and the lag, add to the covariance
+        "beside": (p + n, p + n),  # what errors of the motion add to the covariance
         "beside_shared": (3, b, p + n),  # its part with each body's errors: zero, velocity, displacement
         "beside_time": (1,),  # s since the impact
+        "stated": (p, p),  # the covariance with it, and with the lag
+        "walking": (p,),  # RLS: theta of the filter beside it that lets it walk; `factors` are that filter's
+        "walking_noise": (q,),
+        "walking_beside": (p, p),
+        "walking_shared": (3, b, p),
     }
 
 

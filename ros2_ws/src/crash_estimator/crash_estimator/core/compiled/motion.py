@@ -191,4 +191,4 @@ def value_of(value, slot, theta, j):
 def likely(value, slot, s, j):
     """The parameter's root mean square, with the sign of its latest value."""
     k = slot[j]
-    return value if k < 0 else np.copysign(np.sqrt(value**2 + s.covariance[k, k] + s.beside[k, k]), value)
+    return value if k < 0 else np.copysign(np.sqrt(value**2 + s.stated[k, k]), value)

@@ -49,7 +49,9 @@ class Plan(NamedTuple):
 
 
 class MethodPlan(NamedTuple):
-    """Settings of the Kalman filter, or of RLS and MRLS; what the other one needs is left at NaN or 0."""
+    """Settings of the Kalman filter, or of RLS and MRLS; what the other one needs is left at NaN or 0.
+
+    RLS and MRLS have a filter beside them (`estimators/lag.py`): the first two settings after the kind are of it."""
 
     is_kalman: bool
     constrained: bool = True
@@ -117,6 +119,7 @@ def make_method_plan(method: Kalman | Rls) -> MethodPlan:
         return MethodPlan(True, constrained=bool(method.constrained), noise_memory=float(method.noise_memory))
     return MethodPlan(
         False,
+        noise_memory=Kalman.noise_memory,
         forgetting=np.nan if method.forgetting is None else float(method.forgetting),
         memory=float(method.memory),
         cr=float(method.cr),

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from ..kinematics import FEWEST
+from ..regressor_errors import ONE_SIDED, TWO_SIDED
 
 
 @njit(cache=True, inline="always")
@@ -47,12 +48,30 @@ def move_on(s, time):
     """C goes on to the time of this sample, s since the impact: u += z dt, d += u dt + z dt^2 / 2."""
     dt = time - s.beside_time[0]
     s.beside_time[0] = time
-    shared = s.beside_shared
+    _moved(s.beside_shared, dt)
+    _moved(s.walking_shared, dt)
+
+
+@njit(cache=True)
+def _moved(shared, dt):
     for b in range(shared.shape[1]):
         for j in range(shared.shape[2]):
             z, u = shared[0, b, j], shared[1, b, j]
             shared[1, b, j] = u + z * dt
             shared[2, b, j] += (u + 0.5 * z * dt) * dt
+
+
+@njit(cache=True)
+def late(theta, of_filter, covariance, stated):
+    """Fill stated (p, p) of theta (p,), given a filter's of that covariance (p, p), which may be `stated` itself."""
+    more = np.empty(len(theta))
+    for j in range(len(theta)):
+        behind, s = of_filter[j] - theta[j], np.sqrt(max(covariance[j, j], 0.0))
+        reach = max(s, (abs(behind) + ONE_SIDED * s) / TWO_SIDED)
+        more[j] = np.copysign(np.sqrt(max(reach**2 - s**2, 0.0)), behind)
+    for j in range(len(theta)):
+        for k in range(len(theta)):
+            stated[j, k] = covariance[j, k] + more[j] * more[k]
 
 
 @njit(cache=True)

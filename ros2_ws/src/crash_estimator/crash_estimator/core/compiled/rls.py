@@ -3,9 +3,10 @@
 import numpy as np
 from numba import njit
 
-from ..regressor_errors import SMALLEST_SHARE
+from .factors import product_of
+from .kalman import Filter, filtered
 from .linear import invert, multiply
-from .regressor_errors import pass_on
+from .regressor_errors import late, pass_on
 
 
 @njit(cache=True)
@@ -243,8 +244,6 @@ def rls_step(plan, method, s, row, dt, known, gradient, by_errors, errors, activ
                     total += gradient[i, j] * s.covariance[j, h] * gradient[k, h]
             row.innovation_covariance[i, k] = total
     error, gain = np.empty(q), np.empty((p, q))
-    for j in range(p):
-        s.beside[j, j] += walk[j] * max(abs(s.theta[j]), SMALLEST_SHARE * plan.scale[j]) ** 2
     correct(
         plan, method, s, gradient, by_errors, errors, target, active, learnt, dt, 1.0, error, clamped, gain
     )  # fmt: skip
@@ -253,6 +252,15 @@ def rls_step(plan, method, s, row, dt, known, gradient, by_errors, errors, activ
     else:
         remember(s, gradient, target, learnt, active, dt, error, gain, m)
         row.rewinds[0] = rewind(plan, method, s, by_errors, errors, clamped) if int(s.clock[1]) == m else 0
+        gain[:, :] = s.window_influence[int(s.clock[1]) - 1]
+    covariance_of(s)
+    for i in range(q):
+        left = s.noise[i]
+        for j in range(p):
+            left -= 2.0 * gradient[i, j] * gain[j, i] * s.noise[i]
+            for h in range(p):
+                left += gradient[i, j] * s.covariance[j, h] * gradient[i, h]
+        row.residual_std[i] = np.sqrt(max(left, 0.0))
     share = dt / (dt + 4.0 * method.memory)
     for i in range(q):
         residual = target[i]
@@ -262,4 +270,12 @@ def rls_step(plan, method, s, row, dt, known, gradient, by_errors, errors, activ
             s.noise[i] += share * (max(error[i] * residual, 0.0) - s.noise[i])
         if learnt[i] == learnt[i]:
             s.noise[i] = max(s.noise[i], learnt[i])
-    covariance_of(s)
+    s.stated[:, :] = s.covariance + s.beside
+    if plan.drift_squared.max() > 0.0:
+        filtered(
+            plan, method, Filter(s.walking, s.factors, s.walking_noise, s.walking_beside, s.walking_shared), dt,
+            gradient, by_errors, errors, active, walk, learnt, target, np.empty(p), np.empty((q, q)), np.empty(q),
+        )  # fmt: skip
+        product_of(s.factors, s.stated)
+        s.stated[:, :] += s.walking_beside
+        late(s.theta, s.walking, s.stated, s.stated)

@@ -42,6 +42,11 @@ class StateViews(NamedTuple):
     beside: np.ndarray
     beside_shared: np.ndarray
     beside_time: np.ndarray
+    stated: np.ndarray
+    walking: np.ndarray
+    walking_noise: np.ndarray
+    walking_beside: np.ndarray
+    walking_shared: np.ndarray
 
 
 class RowViews(NamedTuple):
@@ -84,7 +89,8 @@ def state_views(s, n):
     w = n.estimated + n.offsets
     k = cuts((
         2, c, c, b, q, b, b, b, e, e, e, e, e, w, p * p, w * w, q, p * p, p * p, q * q, 1,
-        m * q * p, m * q, m * q, m * p, m, m * q, m * p * q, m * q, w * w, 3 * b * w, 1,
+        m * q * p, m * q, m * q, m * p, m, m * q, m * p * q, m * q, w * w, 3 * b * w, 1, p * p, p, q,
+        p * p, 3 * b * p,
     ))  # fmt: skip
     return StateViews(
         s[k[0] : k[1]],  # clock
@@ -119,6 +125,11 @@ def state_views(s, n):
         s[k[29] : k[30]].reshape((w, w)),  # beside
         s[k[30] : k[31]].reshape((3, b, w)),  # beside_shared
         s[k[31] : k[32]],  # beside_time
+        s[k[32] : k[33]].reshape((p, p)),  # stated
+        s[k[33] : k[34]],  # walking
+        s[k[34] : k[35]],  # walking_noise
+        s[k[35] : k[36]].reshape((p, p)),  # walking_beside
+        s[k[36] : k[37]].reshape((3, b, p)),  # walking_shared
     )
 
 

@@ -25,9 +25,9 @@ import numpy as np
 
 from ..estimate import Event
 from ..regression import Regression
-from ..regressor_errors import SMALLEST_SHARE
 from ..structure import ModelError
 from .kalman import Kalman, KalmanState
+from .lag import Walking, followed, with_lag
 from .update import Theta, Update
 from .window import Window, mean_of, widened
 
@@ -55,6 +55,7 @@ class AfmmState(NamedTuple):
     sample_noise: np.ndarray  # (q,) variance of a sample's residual
     reported: float  # s since the impact: the last jump reported
     update: Update
+    lag: Walking = None  # the filter beside the bank
 
 
 @dataclass(frozen=True)
@@ -94,10 +95,14 @@ class Afmm:
         if window.duration >= self.interval * (1.0 - 1e-6):
             state, events = self._step(state, window, regression)
             window = None
-        state = self._learn_sample_noise(state._replace(window=window), regression)
+        lag = followed(self.settings, state.lag, regression)  # sample by sample: between steps theta is late as well
+        state = self._learn_sample_noise(state._replace(window=window, lag=lag), regression)
         spread = regression.gradient @ state.update.covariance @ regression.gradient.T
-        update = state.update._replace(innovation_covariance=np.diag(state.sample_noise) + spread, events=events)
-        return state._replace(update=update._replace(events=())), update
+        update = state.update._replace(
+            innovation_covariance=np.diag(state.sample_noise) + spread, events=events,
+            all_told=with_lag(state.update.stated, state.update.theta, lag),
+        )  # fmt: skip
+        return state._replace(update=state.update._replace(events=())), update
 
     @property
     def _filter(self) -> Kalman:
@@ -107,7 +112,7 @@ class Afmm:
         """The bank's step on the means over the window."""
         mean = mean_of(window, now)
         noise = np.where(np.isnan(state.noise), mean.noise, state.noise)
-        models = _normalised([self._weighed(model, mean, noise, window.walk) for model in state.models])
+        models = _normalised([self._weighed(model, mean, noise) for model in state.models])
         best = _likeliest(models)
         noise = self._learn_noise(noise, mean, best.products)
         reported, events = state.reported, ()
@@ -120,20 +125,14 @@ class Afmm:
             models=self._branched(models, now.time), noise=noise, reported=reported, update=update
         ), events
 
-    def _weighed(self, model: Model, mean: Regression, noise: np.ndarray, walk: np.ndarray) -> Model:
-        """The model after one step of its filter, its weight times the likelihood of what it did not expect.
-
-        walk (p,): what theta may have walked in the meantime, which is this method's lag.
-        """
+    def _weighed(self, model: Model, mean: Regression, noise: np.ndarray) -> Model:
+        """The model after one step of its filter, its weight times the likelihood of what it did not expect."""
         innovation = mean.measured - mean.known - mean.gradient @ model.filter.theta
         state, update = self._filter.update(model.filter._replace(noise=noise), mean)
         valid = ~np.isnan(innovation)
         covariance = update.innovation_covariance[np.ix_(valid, valid)]
         _, log_determinant = np.linalg.slogdet(covariance)
         squares = innovation[valid] @ np.linalg.solve(covariance, innovation[valid])
-        if mean.errors is not None:
-            size = np.maximum(np.abs(state.theta), SMALLEST_SHARE * self.settings.scale)
-            state = state._replace(beside=state.beside.walked(walk * size**2))
         residual = mean.measured - mean.known - mean.gradient @ state.theta
         log_weight = model.log_weight - 0.5 * (squares + log_determinant)
         return Model(state, log_weight, model.jumped, update, innovation * residual)
@@ -154,15 +153,18 @@ class Afmm:
         """Mean and covariance of the mixture."""
         weights = np.exp([model.log_weight for model in models])
         theta = sum(w * model.filter.theta for w, model in zip(weights, models))
-        covariance, beside = np.zeros((2, len(theta), len(theta)))
+        covariance, all_told = np.zeros((2, len(theta), len(theta)))
         for w, model in zip(weights, models):
             away = model.filter.theta - theta
-            covariance += w * (model.filter.covariance + np.outer(away, away))
-            beside += w * model.filter.beside.covariance
+            own = w * (model.filter.covariance + np.outer(away, away))
+            covariance += own
+            all_told += own + w * model.filter.beside.covariance
         ranked = sorted(models, key=lambda model: -model.log_weight)
         extra = [x for m in ranked for x in (float(np.exp(m.log_weight)), m.jumped if m.jumped > -np.inf else np.nan)]
         extra += [0.0, np.nan] * (self.models - len(ranked))
-        return ranked[0].update._replace(theta=theta, covariance=covariance, extra=tuple(extra), beside=beside)
+        return ranked[0].update._replace(
+            theta=theta, covariance=covariance, extra=tuple(extra), all_told=all_told, residual_variance=None
+        )
 
     def _event(self, best: Model, probability: float, state: AfmmState, time: float) -> Event:
         change = np.where(self.settings.std > 0.0, best.filter.theta - state.update.theta, 0.0) / self.settings.scale

@@ -25,6 +25,7 @@ from ..estimate import Event, standard_deviations
 from ..regression import Regression
 from ..regressor_errors import MotionErrors
 from ..structure import ModelError
+from .lag import Walking, followed, of_first, with_lag
 from .rls import NOISE_FLOOR, Rls, RlsState
 from .rls import THESIS as THESIS_RLS
 from .update import Theta, Update
@@ -62,6 +63,7 @@ class GaussNewtonState(NamedTuple):
     rls: RlsState  # of theta, then d and a of each equation in turn
     past: tuple[Past, ...]  # the latest first
     learning: np.ndarray  # (q,) whether the equation's d and a are estimated yet
+    lag: Walking = None  # of theta alone
 
 
 class NoiseModel(NamedTuple):
@@ -125,7 +127,7 @@ class GaussNewton:
             return GaussNewtonState(rls, (), np.array(without))
         if [(len(model.d), len(model.a)) for model in self.start] != self.orders(equations):
             raise ModelError(
-                f"start of gauss_newton must be one noise model of orders p, q for each of {equations} equations"
+                f"start of gauss_newton must be one noise model of orders p, q an equation, {equations} in all"
             )
         return GaussNewtonState(self._begun(rls), (), np.full(equations, True))
 
@@ -157,6 +159,7 @@ class GaussNewton:
             walk=np.concatenate([regression.walk, np.zeros(n - parameters)]),
             errors=self._passed_on(state, regression),
         )
+        lag = followed(self.settings, state.lag, of_first(wide, state.rls.theta, parameters))
         trust = np.where(learning, 1.0, TRUST)
         rls, update = self._rls(equations).update(self._remembered(state.rls, regression.dt), wide, trust)
         rls = rls._replace(theta=self._stable(rls.theta, equations))
@@ -169,7 +172,7 @@ class GaussNewton:
         begun = learning & ~state.learning & ~np.array([p + q == 0 for p, q in self.orders(equations)])
         update = update._replace(
             events=update.events + tuple(self._begins(int(k), regression.time) for k in np.flatnonzero(begun)),
-            beside=np.asarray(update.beside)[:parameters, :parameters],
+            all_told=with_lag(update.stated[:parameters, :parameters], rls.theta[:parameters], lag),
             theta=rls.theta[:parameters],
             covariance=update.covariance[:parameters, :parameters],
             clamped=update.clamped[:parameters],
@@ -177,7 +180,7 @@ class GaussNewton:
             extra=tuple(rls.theta[parameters:].tolist()),
             extra_std=tuple(standard_deviations(update.covariance)[parameters:].tolist()),
         )
-        return GaussNewtonState(rls, past, learning), update
+        return GaussNewtonState(rls, past, learning, lag), update
 
     def _learning(self, state: GaussNewtonState, regression: Regression) -> np.ndarray:
         """(q,) Whether theta is known well enough for what is left over to be noise.
@@ -270,10 +273,9 @@ class GaussNewton:
         return theta
 
     def _rls(self, equations: int) -> Rls:
-        count = sum(p + q for p, q in self.orders(equations))
-        s, more = self.settings, np.ones(count)
+        s, more = self.settings, np.ones(sum(p + q for p, q in self.orders(equations)))
         wide = Theta(
-            s.names + ("",) * count,
+            s.names + ("",) * len(more),
             np.concatenate([s.initial, 0.0 * more]),
             np.concatenate([s.std, COEFFICIENT_STD * more]),
             np.concatenate([s.lower, -np.inf * more]),

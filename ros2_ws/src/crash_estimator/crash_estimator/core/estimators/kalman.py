@@ -36,7 +36,7 @@ import numpy as np
 
 from ..regression import QUIETEST, Regression
 from ..regressor_errors import SMALLEST_SHARE, Consequence, none_yet
-from .update import Theta, Update, within_bounds
+from .update import Theta, Update, residual_variance, within_bounds
 
 THESIS = {"process_noise": 3.0, "noise_memory": 0.0, "offsets": False, "regressor_errors": False}
 """Settings of 6.3 as printed. R1, in scales per square root of a second, is ours: of 1, 3, 10 and 30 the one with the
@@ -117,11 +117,12 @@ class Kalman:
         residual = target - regression.gradient @ updated - expected_after
         products = residual * (target - regression.gradient @ theta - expected)
         beside = self._beside(state, regression, gradient, gains)
+        left = residual_variance(noise, gradient, covariance_of(root), _influence(gradient, target, gains))
         root = np.hstack([root, self._constant_walk(regression, len(root))])
         state = KalmanState(updated, narrowed(root), both[p:], self._adapt(noise, products, regression), beside)
         return state, Update(
             updated, state.covariance, innovation_covariance, clamped, expected_error=(expected, expected_after),
-            beside=beside.covariance[:p, :p],
+            all_told=state.covariance + beside.covariance[:p, :p], residual_variance=left,
         )  # fmt: skip
 
     def _beside(
@@ -176,6 +177,15 @@ class Kalman:
         share = regression.dt / (regression.dt + self.noise_memory)
         adapted = noise + share * (np.where(np.isnan(products), noise, np.maximum(products, 0.0)) - noise)
         return np.maximum(adapted, np.nan_to_num(regression.noise, nan=QUIETEST**2))
+
+
+def _influence(gradient: np.ndarray, target: np.ndarray, gains: list[np.ndarray]) -> np.ndarray:
+    """(n, q) Of each equation's noise on the error after all updates; gains (n,) of the measured ones in their turn."""
+    influence = np.zeros(gradient.shape[::-1])
+    for row, gain in zip(np.flatnonzero(~np.isnan(target)), gains, strict=True):
+        influence -= np.outer(gain, gradient[row] @ influence)
+        influence[:, row] += gain
+    return influence
 
 
 def _with_offsets(root: np.ndarray, variance: np.ndarray) -> np.ndarray:

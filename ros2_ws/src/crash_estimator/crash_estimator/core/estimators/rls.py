@@ -36,8 +36,9 @@ import numpy as np
 
 from ..estimate import Event
 from ..regression import Regression
-from ..regressor_errors import SMALLEST_SHARE, Consequence, none_yet
-from .update import Theta, Update, within_bounds
+from ..regressor_errors import Consequence, none_yet
+from .lag import Walking, followed, with_lag
+from .update import Theta, Update, residual_variance, within_bounds
 
 NOISE_FLOOR = 0.1
 """Share of the known noise variance below which Lambda must not fall: it is the mean of few E E': nearly singular."""
@@ -60,7 +61,8 @@ class RlsState(NamedTuple):
     errors: tuple[np.ndarray, ...]  # and their errors
     influence: tuple[np.ndarray, ...]  # B_i of each, (p, q)
     variances: tuple[np.ndarray, ...]  # r_i of each, (q,)
-    beside: Consequence | None = None  # what the errors of the motion and the lag have made of theta
+    beside: Consequence | None = None  # what the errors of the motion have made of theta
+    lag: Walking = None  # the filter beside it
 
 
 class Step(NamedTuple):
@@ -111,24 +113,24 @@ class Rls:
         """trust: (q,) share of its information that an equation is counted with; its noise counts as so much larger."""
         state = self._started(state, regression)
         innovation_covariance = self._innovation_covariance(state, regression)
-        state, step = self._correct(self._walked(state, regression), regression, 1.0, trust)
+        state = state._replace(lag=followed(self.settings, state.lag, regression))
+        state, step = self._correct(state, regression, 1.0, trust)
         state = self._remember(state, regression, step, state.residual_variance / trust)
         state, clamped, events = self._rewind(state, step.clamped)
+        covariance = self._covariance(state)
+        influence = state.influence[-1] if self.m else step.gain
+        left = residual_variance(state.residual_variance, regression.gradient, covariance, influence)
         state = self._learn_residual(state, regression, step.error)
+        all_told = with_lag(covariance + state.beside.covariance, state.theta, state.lag)
         return state, Update(
-            state.theta, self._covariance(state), innovation_covariance, clamped, events, beside=state.beside.covariance
+            state.theta, covariance, innovation_covariance, clamped, events, all_told=all_told, residual_variance=left
         )
-
-    def _walked(self, state: RlsState, regression: Regression) -> RlsState:
-        size = np.maximum(np.abs(state.theta), SMALLEST_SHARE * self.settings.scale)
-        bodies = 0 if regression.errors is None else len(regression.errors.zero)
-        beside = none_yet(len(state.theta), bodies) if state.beside is None else state.beside
-        if regression.errors is None:
-            return state._replace(beside=beside)
-        return state._replace(beside=beside.walked(regression.walk * size**2))
 
     def _started(self, state: RlsState, regression: Regression) -> RlsState:
         """Lambda starts from the noise known before the impact."""
+        if state.beside is None:
+            bodies = 0 if regression.errors is None else len(regression.errors.zero)
+            state = state._replace(beside=none_yet(len(state.theta), bodies))
         if not np.isnan(state.residual_variance).any():
             return state
         noise = np.nan_to_num(regression.noise, nan=1.0)

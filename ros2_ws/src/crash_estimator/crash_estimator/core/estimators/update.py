@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..estimate import Event
+from ..regression import drift_of
 from ..structure import Structure
 
 
@@ -18,6 +19,7 @@ class Theta(NamedTuple):
     lower: np.ndarray
     upper: np.ndarray
     scale: np.ndarray  # order of magnitude
+    drifts: bool = False  # whether the model lets any of them walk
 
 
 class Update(NamedTuple):
@@ -32,12 +34,29 @@ class Update(NamedTuple):
     # (q,) each: the error that a noise model expected, with theta before and after the update
     extra: tuple[float, ...] = ()  # what the method knows besides theta, named by its `extra_names`
     extra_std: tuple[float, ...] = ()  # of each; empty: none is known
-    beside: np.ndarray | float = 0.0  # (p, p) of theta, what is due to errors of the motion and to the lag
+    all_told: np.ndarray | None = None  # (p, p) of theta with errors of the motion and the lag; None: not counted
+
+    residual_variance: np.ndarray | None = None  # (q,) of measured minus predicted after it; None: as before it
 
     @property
-    def variance(self) -> np.ndarray:
-        """(p,) of theta, all together."""
-        return np.diagonal(self.covariance + self.beside)
+    def stated(self) -> np.ndarray:
+        """(p, p) covariance that is stated of theta."""
+        return self.covariance if self.all_told is None else self.all_told
+
+
+def residual_variance(
+    noise: np.ndarray, gradient: np.ndarray, covariance: np.ndarray, influence: np.ndarray
+) -> np.ndarray:
+    """(q,) Of what an update leaves, e - Psi (error of theta), of a noise e of variance R, `noise` (q,).
+
+    The part B e of theta's error is due to e itself, B `influence` (p, q), so that with P theta's covariance after it
+
+        R + Psi P Psi' - 2 Psi B R
+
+    R - Psi P Psi' = R S^-1 R for the Kalman gain, B R = P Psi', and all of S where theta is held, B = 0.
+    """
+    spread = np.einsum("qp,pr,qr->q", gradient, covariance, gradient)
+    return noise * (1.0 - 2.0 * np.einsum("qp,pq->q", gradient, influence)) + spread
 
 
 def theta_settings(structure: Structure) -> Theta:
@@ -54,6 +73,7 @@ def theta_settings(structure: Structure) -> Theta:
         np.array([p.coefficient.min for p in parameters], dtype=float),
         np.array([p.coefficient.max for p in parameters], dtype=float),
         np.array([p.scale for p in parameters], dtype=float),
+        any(drift_of(p) > 0.0 for p in structure.element_parameters),
     )
 
 

@@ -16,7 +16,6 @@ class Window(NamedTuple):
     noise: np.ndarray  # (q,) variance of a sample
     active: np.ndarray  # (p,)
     duration: float  # s
-    walk: np.ndarray  # (p,) relative variance of theta's walk, which a method may not follow
     by_errors: np.ndarray | float  # (q, b, 3) of the errors of the motion
 
 
@@ -29,13 +28,10 @@ def widened(window: Window | None, regression: Regression) -> Window:
     errors = regression.errors
     by_errors = 0.0 if errors is None else np.where(valid[:, None, None], errors.gradient, 0.0)
     if window is None:
-        return Window(
-            valid.astype(float), target, gradient, noise, regression.active, regression.dt, regression.walk, by_errors
-        )
+        return Window(valid.astype(float), target, gradient, noise, regression.active, regression.dt, by_errors)
     return Window(
         window.samples + valid, window.target + target, window.gradient + gradient, window.noise + noise,
-        window.active | regression.active, window.duration + regression.dt,
-        window.walk + regression.walk, window.by_errors + by_errors,
+        window.active | regression.active, window.duration + regression.dt, window.by_errors + by_errors,
     )  # fmt: skip
 
 
