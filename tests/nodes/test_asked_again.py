@@ -249,3 +249,22 @@ def test_when_the_viewer_waits_for_a_diagnosis_no_longer(word, since, through):
     then = time.monotonic() - since
     account = SimpleNamespace(attending=attending(**word), found_at=then, at_work=then)
     assert bool(Account._is_through(account, "diagnosis", 1)) == through
+
+
+@pytest.mark.parametrize(
+    ("feeding", "told", "unlatched", "begun"),
+    [
+        (False, "one", None, True),
+        (False, "other", None, True),
+        (True, "one", None, False),  # rosbag2's player begins its bag once more
+        (True, "other", None, True),
+        (False, "one", "one", False),  # the same publisher was heard without latching
+    ],
+)
+def test_a_test_that_is_told_once_more_is_a_new_one_but_from_who_repeats_itself(feeding, told, unlatched, begun):
+    tests = []
+    node = SimpleNamespace(
+        test_message="one", unlatched=unlatched, feed=SimpleNamespace(active=feeding), _begin_test=tests.append
+    )
+    EstimatorNode._on_test(node, told)
+    assert bool(tests) == begun and node.unlatched is None
