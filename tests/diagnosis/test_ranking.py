@@ -4,11 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
+from crash_estimator.core.diagnosis.parameterization import magnitudes
 from crash_estimator.core.diagnosis.report import ranking
+from crash_estimator.core.diagnosis.residuals import score_test
 from crash_estimator.core.effects import EFFECTS
-from crash_estimator.core.effects.effect import Addition
+from crash_estimator.core.effects.effect import Addition, ElementMotion
 
 
 @pytest.mark.parametrize(("period", "said"), [(1e-4, True), (0.5 / ranking.SLOWEST, True), (1e-2, False)])
@@ -42,3 +44,35 @@ def test_a_coefficient_that_is_stated_otherwise_than_it_is_fitted_keeps_its_shar
         turned = [effect.stated(t[0], **dict(zip(shapes, np.exp(t[1:])))) for t in theta + np.diag(1e-6 * std)]
         relative = np.sqrt(np.sum((np.array(turned) - value) ** 2)) / 1e-6 / abs(value)
         assert_allclose(found / abs(value), np.expm1(relative), rtol=1e-3, err_msg=name)
+
+
+@pytest.mark.parametrize("tension", [True, False])
+def test_a_contact_that_is_apart_neither_is_crushed_nor_moves(monkeypatch, tension):
+    """What an effect's order of magnitude is taken from is the motion of an element while it may carry."""
+    crush, rate = np.array([0.1, 0.0, -0.2]), np.array([1.0, 2.0, 3.0])
+    motion = ElementMotion(np.zeros(3), crush, rate, np.full(3, 0.1), np.zeros(3))
+    monkeypatch.setattr(magnitudes, "element_motion", lambda *given: motion)
+    structure = SimpleNamespace(elements=[SimpleNamespace(tension=tension)])
+    found = magnitudes.Magnitudes.motion(SimpleNamespace(structure=structure, records=[0], measured=[0]), 0, 0)
+    assert_array_equal(found.crush, crush if tension else [0.1, 0.0, 0.0])
+    assert_array_equal(found.rate, rate if tension else [1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("squares", "named"),
+    [
+        ((40.0, 1.0, 2.0), "the mass of car"),
+        ((1.0, 40.0, 2.0), "a force on car"),
+        ((40.0, 39.9, 2.0), "the mass of car or a force on car"),  # which of them, nobody can tell
+    ],
+)
+def test_what_varies_with_time_is_named_with_what_cannot_be_told_from_it(monkeypatch, squares, named):
+    layout = SimpleNamespace(kind=[score_test.FREE], bodies=["car"], outputs=[SimpleNamespace(channel="car_ax")])
+    modes, statistics = score_test.MODES, iter(squares)
+    normal = SimpleNamespace(cost=1040.0, samples=1000)
+    monkeypatch.setattr(score_test, "_normal_equations", lambda *given: normal)
+    monkeypatch.setattr(score_test, "_marginal", lambda *given: (np.zeros(3 * modes), np.eye(3 * modes)))
+    monkeypatch.setattr(score_test, "_statistic", lambda *given: (next(statistics), 4))
+    found = score_test.drift_of(SimpleNamespace(layout=layout))
+    assert found.what == named and not found.constant
+    assert found.share == pytest.approx((max(squares) - 4) / 40.0)
