@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from crash_estimator.core.diagnosis.mechanics import link_force
 from crash_estimator.core.diagnosis.parameterization import magnitudes
+from crash_estimator.core.diagnosis.parameterization.terms import Term
 from crash_estimator.core.diagnosis.report import ranking
 from crash_estimator.core.diagnosis.residuals import score_test
 from crash_estimator.core.effects import EFFECTS
@@ -76,3 +78,22 @@ def test_what_varies_with_time_is_named_with_what_cannot_be_told_from_it(monkeyp
     found = score_test.drift_of(SimpleNamespace(layout=layout))
     assert found.what == named and not found.constant
     assert found.share == pytest.approx((max(squares) - 4) / 40.0)
+
+
+@pytest.mark.parametrize("name", [name for name, effect in EFFECTS.items() if effect.scales_static])
+def test_the_derivatives_of_a_factor_on_a_spring_are_those_of_its_law(name):
+    """Of finite differences of another size: the fit's steps hang on them, its answers do not."""
+    effect = EFFECTS[name]
+    shapes = {key: shape.starts[0] for key, shape in effect.shapes.items()}
+    addition = Addition(effect, "spring", dict(shapes))
+    term = Term(addition, 0, {key: k for k, key in enumerate(shapes, 1)})
+    theta, rate = np.array([0.1, *np.log(list(shapes.values()))]), np.array([-3.0, -0.5, 0.7, 4.0])
+    value, slope, by_shape = link_force._factor(term, theta, rate)
+    assert_allclose(value, effect.factor(rate, **shapes))
+    wide = 1e-3
+    expected = (effect.factor(rate + wide, **shapes) - effect.factor(rate - wide, **shapes)) / (2.0 * wide)
+    assert_allclose(slope, expected, rtol=1e-3, atol=1e-6 * np.abs(expected).max())
+    for k, key in enumerate(shapes):
+        turned = [effect.factor(rate, **shapes | {key: shapes[key] * np.exp(s * wide)}) for s in (1.0, -1.0)]
+        expected = (turned[0] - turned[1]) / (2.0 * wide)
+        assert_allclose(by_shape[k], expected, rtol=1e-3, atol=1e-6 * np.abs(expected).max())
