@@ -18,6 +18,7 @@ from crash_estimator.nodes.asking import Asking
 from crash_estimator.nodes.diagnosis_node import DiagnosisNode
 from crash_estimator.nodes.estimate_messages import EstimateMessages
 from crash_estimator.nodes.estimates_again import EstimatesAgain
+from crash_estimator.nodes.estimator_model import EstimatorModel
 from crash_estimator.nodes.estimator_node import EstimatorNode
 from crash_estimator.nodes.intake import Intake
 from crash_estimator.nodes.revised_estimates import RevisedEstimates, Wanted
@@ -136,9 +137,30 @@ def test_where_the_diagnosis_stands_when_what_it_missed_has_come(run, end, came,
 
 def test_each_pass_of_a_bag_that_is_played_again_counts_as_one():
     node = SimpleNamespace(kept=object(), run=0, end=90, _begin_anew=lambda: None)
+    estimator = SimpleNamespace(feed_run=0, follower=None)
     for run in (1, 2):
         DiagnosisNode._on_feed_begins(node, renumbered=False)
-        assert (node.run, node.end) == (run, 0)
+        EstimatorNode._on_feed_begins(estimator, renumbered=False)
+        assert (node.run, node.end, estimator.feed_run) == (run, 0, run)
+
+
+def test_each_change_of_a_model_is_one_revision():
+    given = EstimatorModel(oscillator(ESTIMATED), "mrls", {"forgetting": 0.99}, {}, revision=0)
+    changed = given.with_settings({"settings.forgetting": 0.9})
+    assert (changed.settings["forgetting"], changed.revision) == (0.9, 1)
+    assert changed.with_structure(oscillator()).revision == 2 and given.revision == 0
+
+
+@pytest.mark.parametrize(("prepared", "busy", "told"), [(False, False, 1), (False, True, 0), (True, False, 0)])
+def test_a_diagnosis_says_once_that_it_is_prepared(prepared, busy, told):
+    said = []
+    node = SimpleNamespace(
+        prepared=prepared, kept=None, attending=SimpleNamespace(tell=lambda: said.append(1)),
+        worker=SimpleNamespace(busy=busy, reply=lambda: None),
+    )  # fmt: skip
+    for _ in range(3):
+        DiagnosisNode._look(node)
+    assert len(said) == told and node.prepared == (not busy)
 
 
 def test_what_is_said_again_has_the_stamp_of_its_first_sample():
