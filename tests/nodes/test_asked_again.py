@@ -9,11 +9,12 @@ from crash_msgs.srv import GetEstimates
 from helpers_estimation import ESTIMATED, oscillator, oscillator_recording
 from rclpy.serialization import deserialize_message
 
+from crash_estimator.core.diagnosis.report.tolerance import DEFAULT
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.following.follower import Follower
 from crash_estimator.following.in_order import About
 from crash_estimator.kept import Kept, Rows
-from crash_estimator.nodes import whole_estimates
+from crash_estimator.nodes import diagnosis_answerer, whole_estimates
 from crash_estimator.nodes.asking import Asking
 from crash_estimator.nodes.diagnosis_node import DiagnosisNode
 from crash_estimator.nodes.estimate_messages import EstimateMessages
@@ -290,3 +291,12 @@ def test_a_test_that_is_told_once_more_is_a_new_one_but_from_who_repeats_itself(
     )
     EstimatorNode._on_test(node, told)
     assert bool(tests) == begun and node.unlatched is None
+
+
+@pytest.mark.parametrize("stated", [None, DEFAULT._replace(of_peak=0.07)])
+def test_what_is_tolerated_is_what_the_task_says_else_the_default(monkeypatch, stated):
+    asked = []
+    monkeypatch.setattr(diagnosis_answerer, "diagnose", lambda *given: asked.append(given[3]))
+    monkeypatch.setattr(diagnosis_answerer, "final_answer", lambda found: found)
+    diagnosis_answerer.Answerer({}).answer(diagnosis_answerer.Task(None, None, True, stated, 1.0))
+    assert asked == [stated or DEFAULT]
