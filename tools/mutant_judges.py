@@ -26,9 +26,9 @@ from mutant_runs import (
 )
 
 JUDGES = ("replay", "nodes", "core", "diagnosis", "viewer")  # folders of tests
-PLAIN_JUDGES = re.compile(r"tests/core/|\b(core\.compiled|mechanics|output_error|observation)\b")
+PLAIN_JUDGES = re.compile(r"tests/core/|oracles|\b(core\.compiled|mechanics|output_error|observation)\b")
 """Of what numba compiles: what a file of tests is called or imports. Of the others few end in time without it."""
-PATIENCE, SHORT = 60.0, (2.0, 8.0)  # s, to catch one; of tests that are tried first, and then, before all others
+PATIENCE, SHORT = 40.0, (2.0, 8.0)  # s, to catch one; of tests that are tried first, and then, before all others
 
 
 class Test(NamedTuple):
@@ -160,22 +160,29 @@ def _learn(task: tuple[str, bool, Path]) -> str:
 
 
 @cache
-def plain_files() -> set[Path]:
-    """What numba compiles, and what it is imported from there: these are judged as Python."""
+def _compiled() -> tuple[set[Path], set[Path]]:
+    """The files that numba compiles, and those that they import from."""
     of = [file for package in PACKAGES for file in (SOURCES / package / package).rglob("*.py")]
     compiled = {file for file in of if re.search(r"^from numba import .*njit", file.read_text(), re.MULTILINE)}
-    found = set(compiled)
+    beside = set()
     for file in compiled:
         for node in ast.walk(ast.parse(file.read_text())):
             if isinstance(node, ast.ImportFrom) and node.level:
                 base = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
-                found |= {base.with_suffix(".py"), *(base / f"{alias.name}.py" for alias in node.names)}
-    return {file.relative_to(SOURCES) for file in found if file.exists()}
+                beside |= {base.with_suffix(".py"), *(base / f"{alias.name}.py" for alias in node.names)}
+    return {file.relative_to(SOURCES) for file in compiled}, {file.relative_to(SOURCES) for file in beside}
+
+
+def is_plain(path: Path, line: int) -> bool:
+    """Whether a line is judged as Python: numba compiles it, or takes it as a constant from where it stands."""
+    compiled, beside = _compiled()
+    return path in compiled or (path in beside and _place(path, line)[1] is not None)
 
 
 def caught_by(path: Path, line: int, after: str, known: dict[bool, dict[str, Test]]) -> str:
     """The test that fails when a line reads differently, or nothing."""
-    tests, end = known[path in plain_files()], time.monotonic() + PATIENCE
+    plain, end = is_plain(path, line), time.monotonic() + PATIENCE
+    tests = known[plain]
     order, lines = judges(path, line, tests), (SOURCES / path).read_text().splitlines()
     text = "\n".join([*lines[: line - 1], after, *lines[line:]]) + "\n"
     for most in (*SHORT, PATIENCE):
@@ -185,6 +192,6 @@ def caught_by(path: Path, line: int, after: str, known: dict[bool, dict[str, Tes
             spent += tests[test].took + (0.0 if file_of(test) in map(file_of, limits) else 0.2)
             limits[test] = limit(tests[test].took)
         left = end - time.monotonic()
-        if limits and left > 0.0 and (found := failed(limits, path in plain_files(), left, (SOURCES / path, text))):
+        if limits and left > 0.0 and (found := failed(limits, plain, left, (SOURCES / path, text))):
             return found[0]
     return ""

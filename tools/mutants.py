@@ -114,9 +114,12 @@ def judge(mutants: list[Mutant], minutes: float) -> list[Verdict]:
         mutant, by = verdict
         said = f"{mutant.path.name}:{mutant.line} {f'caught by {by}' if by else 'SURVIVED'}"
         print(f"{len(verdicts)}/{len(mutants)} {said}, {(time.monotonic() - start) / 60.0:.1f} min", flush=True)
-    plain = mutant_judges.plain_files()
-    wrong = mutant_judges.wrong_ones({(v.mutant.path in plain, v.by) for v in verdicts if v.by}, _known)
-    return [v for v in verdicts if (v.mutant.path in plain, v.by) not in wrong]
+    wrong = mutant_judges.wrong_ones({(_is_plain(v.mutant), v.by) for v in verdicts if v.by}, _known)
+    return [v for v in verdicts if (_is_plain(v.mutant), v.by) not in wrong]
+
+
+def _is_plain(mutant: Mutant) -> bool:
+    return mutant_judges.is_plain(mutant.path, mutant.line)
 
 
 def _verdict(mutant: Mutant) -> Verdict | None:
@@ -189,8 +192,11 @@ def main() -> None:
     given = parser.parse_args()
     mutants, kept = drawn(given.mutants, given.seed, given.only), KEPT / f"seed{given.seed}.json"
     before = dict(json.loads(kept.read_text())) if given.again else {}
-    caught = [Verdict(mutant, before[_name(mutant)]) for mutant in mutants if before.get(_name(mutant))]
-    verdicts = caught + judge([mutant for mutant in mutants if not before.get(_name(mutant))], given.minutes)
+    asked = [mutant for mutant in mutants if not before.get(_name(mutant))]
+    verdicts = judge(sorted(asked, key=lambda mutant: _name(mutant) in before), given.minutes)
+    judged = {_name(mutant) for mutant, _ in verdicts}
+    again = [mutant for mutant in mutants if _name(mutant) in before and _name(mutant) not in judged]
+    verdicts += [Verdict(mutant, before[_name(mutant)]) for mutant in again]  # that stands
     kept.write_text(json.dumps([(_name(mutant), by) for mutant, by in verdicts]))
     target = ROOT / "docs" / "mutants.md"
     target.write_text(page(section(verdicts, given.seed, given.mutants), target.read_text()))
