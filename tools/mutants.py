@@ -193,6 +193,7 @@ def main() -> None:
     mutants, kept = drawn(given.mutants, given.seed, given.only), KEPT / f"seed{given.seed}.json"
     before = dict(json.loads(kept.read_text())) if given.again else {}
     asked = [mutant for mutant in mutants if not before.get(_name(mutant))]
+    asked = asked[:: -1 if given.again else 1]  # the run before may not have come to the last ones
     verdicts = judge(sorted(asked, key=lambda mutant: _name(mutant) in before), given.minutes)
     judged = {_name(mutant) for mutant, _ in verdicts}
     again = [mutant for mutant in mutants if _name(mutant) in before and _name(mutant) not in judged]
