@@ -67,7 +67,7 @@ endurance: # a million samples through every method, 500 tests and 500 passes th
 fuzz: # 20 000 wrong inputs on every way in: docs/fuzz.md; ARGS="--seed 2", or "--replay out/fuzz/FILE" for one that failed
 	@tools/env python -m crash_estimator.fuzz.command $(ARGS)
 
-mutants: # what share of 200 one-line mistakes the tests catch: docs/mutants.md; ARGS="--seed 2", --mutants, --only core/estimators, --minutes
+mutants: # what share of 200 one-line mistakes the tests catch: docs/mutants.md; ARGS="--seed 2", --mutants, --only core/estimators, --minutes, --again for those not caught
 	@tools/env python tools/mutants.py $(ARGS)
 
 clean: # removes what the set-up installed and built, and what the programs wrote

@@ -1,40 +1,32 @@
 """What share of one-line mistakes the tests catch: docs/mutants.md.
 
-A mutant is a copy of the packages, in out/mutants, with one operator, condition or number changed. The tests that are
-named like its module, import it or stand beside it judge it, file by file; the first that fails has caught it. What is
-not caught within a time counts as not caught. At the end each test that has caught one must pass on the code as it is;
-where it does not, what it has caught counts as not judged. In core/compiled the readable form judges: numba is off
-(NUMBA_DISABLE_JIT), the recursion runs as Python beside its readable twin, and nothing is compiled anew.
+A mutant is the code with one operator, condition or number changed. First the tests are run once on the code as it is,
+to learn which executes which line, and how long it takes; those that take long, or fail, judge nothing, and what a test
+starts in another process is not seen. A mutant is then judged by the tests that execute its line, quickest first; the
+first that fails, or takes ten times as long and 10 s more, has caught it. A line that is executed at import alone, as a
+constant's, is judged by the tests that execute a line with its name, then by those of its file. What is not caught
+within a time counts as not caught. At the end each test that has caught one must pass on the code as it is; where it
+does not, what it has caught counts as not judged. What numba compiles, and where that takes its constants from, runs as
+Python (NUMBA_DISABLE_JIT): so its lines are seen, and nothing is compiled anew or found in a cache.
 """
 
 import argparse
 import ast
-import os
+import json
 import random
 import re
-import shutil
-import subprocess
-import sys
 import time
 from collections import Counter
 from pathlib import Path
 from typing import NamedTuple
 
-ROOT = Path(__file__).resolve().parent.parent
-SOURCES, TREE = ROOT / "ros2_ws" / "src", ROOT / "out" / "mutants"
-PACKAGES = ("crash_estimator", "crash_replay")
+import mutant_judges
+from mutant_runs import KEPT, PACKAGES, ROOT, SLOW, SOURCES, shared_out
+
 PARTS = {"core": (PACKAGES[0], 0.6), "readers": (PACKAGES[1], 0.25), "nodes": (PACKAGES[0], 0.15)}
 """Folder -> its package, and its share of the mutants: about that of the lines."""
-BESIDE = {  # folder -> tests of what it computes that neither bear the name of a module nor import it
-    "core/estimators": "core/test_printed_recursions core/test_estimators core/test_zero_offsets core/test_coverage",
-    "core/compiled": "core/test_factors core/test_compiled",
-    "core/diagnosis": "diagnosis/test_diagnosis_oracles diagnosis/test_diagnosis_propagation diagnosis/test_diagnosis",
-    "core/effects": "core/test_effects core/test_effects_in_estimators core/test_effects_of_a_model",
-    "core": "core/test_motion_and_contact core/test_estimators core/test_further_parameters core/test_validation",
-    "readers": "replay/test_import_isomme replay/test_import_nhtsa replay/test_import_lab replay/test_import_command",
-    "nodes": "nodes/test_in_order nodes/test_named_estimates nodes/test_estimator_node nodes/test_diagnosis_node",
-}
-MOST_JUDGES, PATIENCE = 4, 120.0  # files of tests, and s for all of them, to catch one
+WRITTEN_AFTER = (1,)
+"""Seeds of which what survived became tests: another seed says what the tests catch that nothing was written for."""
 SIGNS = {ast.Add: "+ -", ast.Sub: "- +", ast.Mult: "* /", ast.Div: "/ *", ast.Pow: "** *", ast.And: "and or",
          ast.Or: "or and", ast.Eq: "== !=", ast.NotEq: "!= ==", ast.Lt: "< >=", ast.LtE: "<= >", ast.Gt: "> <=",
          ast.GtE: ">= <"}  # fmt: skip
@@ -42,6 +34,9 @@ BOUNDARY = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
 """Beside a whole number: there it is another one; of two measurements it hardly ever is."""
 SILENT = re.compile(r"raise |Error\(|say\(|\.info\(|\.warn|help=|f\"|import |@|Allowed\(|TYPE_CHECKING")
 """Lines of messages, declarations and imports: a changed one is no wrong result."""
+
+EQUAL = {"strict=False": "the lengths are alike, and are checked no more"}
+"""What a mutant may have that its line has not, and why it provably changes nothing; it counts as not caught."""
 
 
 class Mutant(NamedTuple):
@@ -103,94 +98,79 @@ def drawn(count: int, seed: int, only: str = "") -> list[Mutant]:
     return chosen
 
 
-def judges(mutant: Mutant) -> list[str]:
-    """Files of tests: those that have a word of the module's name, those that import it, those beside it."""
-    stem, parent = mutant.path.stem, mutant.path.parent.name
-    inner = "/".join(mutant.path.parts[2:])
-    tests = sorted((ROOT / "tests").rglob("test_*.py"))
-    asked = re.compile(rf"\b{parent}\.{stem} import|\b{parent} import [^\n]*\b{stem}\b")
-    importing = [t for t in tests if asked.search(t.read_text())]
-    words = {word for word in stem.split("_") if len(word) > 2} - {"nhtsa", "diagnosis", "estimator", "viewer"}
-    near = {"readers": "replay", "nodes": "nodes"}.get(mutant.part, "diagnosis" if "/diagnosis/" in inner else "core")
-    named = [t for t in tests if t.parent.name == near and words & set(t.stem.split("_"))]
-    folder = max((folder for folder in BESIDE if inner.startswith(folder)), key=len)
-    beside = [ROOT / "tests" / f"{name}.py" for name in BESIDE[folder].split()]
-    return list(dict.fromkeys(str(t.relative_to(ROOT)) for t in [*named, *importing, *beside]))[:MOST_JUDGES]
+class Verdict(NamedTuple):
+    mutant: Mutant
+    by: str  # the test that caught it, or nothing
 
 
-def failed(tests: list[str], compiled: bool, patience: float) -> list[str]:
-    """Run tests on the copy as it stands -> those that failed, at most one of a file; the file where it went wrong."""
-    path = os.pathsep.join([*(str(TREE / package) for package in PACKAGES), os.environ.get("PYTHONPATH", "")])
-    fixed = {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
-             "OMP_NUM_THREADS": "1", "NUMBA_CACHE_DIR": str(TREE / "numba")}  # fmt: skip
-    off = {"NUMBA_DISABLE_JIT": "1"} if compiled else {}
-    plain = ["-p", "_hypothesis_pytestplugin", "-p", "no:cacheprovider", "-q", "--tb=no", *["-x"][len(tests) > 1 :]]
-    command, environment = [sys.executable, "-m", "pytest", *plain, *tests], os.environ | fixed | off
-    try:
-        done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=patience)
-    except subprocess.TimeoutExpired:
-        return []
-    found = re.findall(r"^(?:FAILED|ERROR) (\S+?)(?: - .*)?$", done.stdout, re.MULTILINE)
-    return found or (tests if done.returncode else [])
+def judge(mutants: list[Mutant], minutes: float) -> list[Verdict]:
+    """Two at once until the time is up; what was caught by a test that fails on the code as it is, is left out."""
+    global _known, _end
+    _known, verdicts = mutant_judges.known_tests(), []
+    start = time.monotonic()
+    _end = start + 60.0 * minutes
+    for verdict in filter(None, shared_out(_verdict, mutants)):
+        verdicts.append(verdict)
+        mutant, by = verdict
+        said = f"{mutant.path.name}:{mutant.line} {f'caught by {by}' if by else 'SURVIVED'}"
+        print(f"{len(verdicts)}/{len(mutants)} {said}, {(time.monotonic() - start) / 60.0:.1f} min", flush=True)
+    wrong = mutant_judges.wrong_ones({(_is_plain(v.mutant), v.by) for v in verdicts if v.by}, _known)
+    return [v for v in verdicts if (_is_plain(v.mutant), v.by) not in wrong]
 
 
-def judge(mutants: list[Mutant], minutes: float) -> list[tuple[Mutant, str]]:
-    """One after another until the time is up -> each with the test that caught it, or nothing."""
-    for package in PACKAGES:
-        shutil.rmtree(TREE / package, ignore_errors=True)
-        shutil.copytree(SOURCES / package / package, TREE / package / package)
-    verdicts, end = [], time.monotonic() + 60.0 * minutes
-    for k, mutant in enumerate(mutants):
-        if time.monotonic() > end:
-            break
-        target, start, by = TREE / mutant.path, time.monotonic(), []
-        text = target.read_text()
-        lines = text.splitlines()
-        lines[mutant.line - 1] = mutant.after
-        target.write_text("\n".join(lines) + "\n")
-        try:
-            for test in judges(mutant):
-                left = PATIENCE - (time.monotonic() - start)
-                by = by or (failed([test], "compiled" in mutant.path.parts, left) if left > 0.0 else [])
-        finally:
-            target.write_text(text)
-        verdicts.append((mutant, by[0] if by else ""))
-        said = f"caught by {by[0]}" if by else "SURVIVED"
-        took = time.monotonic() - start
-        print(f"{k + 1}/{len(mutants)} {mutant.path.name}:{mutant.line} {said}, {took:.0f} s", flush=True)
-    wrong = {}
-    for compiled in (False, True):
-        used = sorted({by for mutant, by in verdicts if by and ("compiled" in mutant.path.parts) == compiled})
-        wrong[compiled] = failed(used, compiled, 60.0 * PATIENCE) if used else []
-    return [(mutant, by) for mutant, by in verdicts if by not in wrong["compiled" in mutant.path.parts]]
+def _is_plain(mutant: Mutant) -> bool:
+    return mutant_judges.is_plain(mutant.path, mutant.line)
 
 
-def page(verdicts: list[tuple[Mutant, str]], seed: int, count: int) -> str:
+def _verdict(mutant: Mutant) -> Verdict | None:
+    if time.monotonic() > _end:
+        return None
+    return Verdict(mutant, mutant_judges.caught_by(mutant.path, mutant.line, mutant.after, _known))
+
+
+def section(verdicts: list[Verdict], seed: int, count: int) -> str:
+    """What the page says of one seed."""
     rows = []
     for column in ("part", "kind"):
-        counts = Counter((getattr(m, column), bool(by)) for m, by in verdicts)
+        counts = Counter((getattr(v.mutant, column), bool(v.by)) for v in verdicts)
         for name in dict.fromkeys(name for name, _ in counts):
             n, hit = counts[name, True] + counts[name, False], counts[name, True]
             rows.append(f"| {column}: {name} | {n} | {hit} | {hit / n:.0%} |")
-    left = [
-        f"- `{'/'.join(m.path.parts[1:])}:{m.line}`: `{m.before.strip()}` -> `{m.after.strip()}`"
-        for m, c in verdicts
-        if not c
-    ]
-    hit, n = sum(bool(by) for _, by in verdicts), max(len(verdicts), 1)
-    return PAGE.format(
-        seed=seed, count=count, hit=hit, n=n, share=hit / n, rows="\n".join(rows), left="\n".join(left) or "None."
+    left = []
+    for m in (m for m, by in verdicts if not by):
+        why = [f" (changes nothing: {why})" for new, why in EQUAL.items() if new in m.after and new not in m.before]
+        shown = f"`{m.before.strip()}` -> `{m.after.strip()}`"
+        left.append(f"- `{'/'.join(m.path.parts[1:])}:{m.line}`: {shown}{''.join(why)}")
+    hit, n = sum(bool(v.by) for v in verdicts), len(verdicts)
+    share = f"**{hit} of {n} caught, {hit / max(n, 1):.0%}**"
+    return SECTION.format(
+        seed=seed, count=count, share=share, rows="\n".join(rows), left="\n".join(left) or "None.",
+        what="tests were written for what it had left" if seed in WRITTEN_AFTER else "no test was written for it",
+    )  # fmt: skip
+
+
+def page(sections: str, before: str) -> str:
+    """The page with a seed's section anew, and those of other seeds as they were."""
+    parts = {part.split(":")[0]: part.strip() for part in re.split(r"^(?=## Seed )", before, flags=re.MULTILINE)[1:]}
+    parts[sections.split(":")[0]] = sections.strip()
+    return (
+        PAGE.format(slow=SLOW, patience=mutant_judges.PATIENCE)
+        + "\n".join(f"\n{parts[name]}" for name in sorted(parts))
+        + "\n"
     )
 
 
 PAGE = """\
 # What share of one-line mistakes the tests catch
 
-Made by `make mutants`, seed {seed}: one operator, condition or number changed in a copy of the packages; the tests that
-are named like the module, import it or stand beside it judge, not all of them (`tools/mutants.py`). The compiled
-recursion is judged as Python beside its readable twin.
+Made by `make mutants`: one operator, condition or number changed. The tests that execute the line judge, quickest
+first, for {patience:g} s at most, but for those that take {slow:g} s or more and for what they do in other processes
+(`tools/mutant_judges.py`). What numba compiles is judged as Python.
+"""
+SECTION = """\
+## Seed {seed}: {what}
 
-**{hit} of {n} caught, {share:.0%}**; {count} were drawn, the others not judged within the time.
+{share}, {count} drawn.
 
 | | judged | caught | share |
 | :-- | --: | --: | --: |
@@ -207,11 +187,26 @@ def main() -> None:
     parser.add_argument("--mutants", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="", help="part of a path, such as core/estimators")
-    parser.add_argument("--minutes", type=float, default=120.0, help="no new one is begun after them")
+    parser.add_argument("--minutes", type=float, default=60.0, help="no new one is begun after them")
+    parser.add_argument("--again", action="store_true", help="judge those that the last run of this seed did not catch")
     given = parser.parse_args()
-    verdicts = judge(drawn(given.mutants, given.seed, given.only), given.minutes)
-    (ROOT / "docs" / "mutants.md").write_text(page(verdicts, given.seed, given.mutants))
-    print(f"docs/mutants.md: {sum(bool(by) for _, by in verdicts)} of {len(verdicts)} caught")
+    mutants, kept = drawn(given.mutants, given.seed, given.only), KEPT / f"seed{given.seed}.json"
+    before = dict(json.loads(kept.read_text())) if given.again else {}
+    asked = [mutant for mutant in mutants if not before.get(_name(mutant))]
+    asked = asked[:: -1 if given.again else 1]  # the run before may not have come to the last ones
+    verdicts = judge(sorted(asked, key=lambda mutant: _name(mutant) in before), given.minutes)
+    judged = {_name(mutant) for mutant, _ in verdicts}
+    again = [mutant for mutant in mutants if _name(mutant) in before and _name(mutant) not in judged]
+    verdicts += [Verdict(mutant, before[_name(mutant)]) for mutant in again]  # that stands
+    kept.write_text(json.dumps([(_name(mutant), by) for mutant, by in verdicts]))
+    target = ROOT / "docs" / "mutants.md"
+    target.write_text(page(section(verdicts, given.seed, given.mutants), target.read_text()))
+    print(f"docs/mutants.md: {sum(bool(v.by) for v in verdicts)} of {len(verdicts)} caught")
+
+
+def _name(mutant: Mutant) -> str:
+    """What tells it from others while lines above it come and go."""
+    return f"{mutant.path}: {mutant.before.strip()} -> {mutant.after.strip()}"
 
 
 if __name__ == "__main__":

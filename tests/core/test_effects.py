@@ -1,5 +1,8 @@
 """The vocabulary of effects: each one's physics, what it may act on, and a user's own."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,7 +14,8 @@ from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.effects.base import ElementForce, ElementMotion
 from crash_estimator.core.effects.targets import checked
 from crash_estimator.core.effects.user import load_effects
-from crash_estimator.core.structure import EffectSpec, ModelError
+from crash_estimator.core.structure import Coefficient, EffectSpec, ModelError
+from crash_estimator.core.structure_parts import ALL, NOTHING, SPRINGS, Action
 from crash_estimator.model_file import load_model
 
 VOCABULARY = """viscous_damping quadratic_damping coulomb_friction hysteresis rate_hardening cubic_stiffness clearance
@@ -195,3 +199,42 @@ def test_a_user_s_file_with_a_fault_is_one_clear_line(kind, tmp_path):
     path.write_text(text)
     with pytest.raises(ModelError, match=f"mine.py.*{expected}"):
         load_effects(path)
+
+
+GAPS = """
+from crash_estimator.core.effects.base import ElementForce, Shape
+
+def force(motion, gap):
+    if not 0.0 < gap < 0.5:
+        raise ValueError(f"a gap of {gap} m")
+    return (motion.crush > gap).astype(float)
+
+EFFECT = ElementForce("gap", "N", {"gap": Shape("m", SHAPE)}, force=force)
+"""
+
+
+@pytest.mark.parametrize(
+    ("shape", "fails"),
+    [
+        ("0.2, 0.9, (0.5,), of_crush=True", False),  # half of the crush that it is tried out on
+        ("0.2, 0.9, (0.3,)", False),  # m
+        ("0.2, 0.9, (0.9,)", True),
+        ("1.0, 9.0, (5.0,), of_crush=True", True),  # five times it
+    ],
+)
+def test_a_shape_constant_is_tried_out_as_what_it_is_a_share_of(tmp_path, shape, fails):
+    path = tmp_path / "mine.py"
+    path.write_text(GAPS.replace("SHAPE", shape))
+    if fails:
+        with pytest.raises(ModelError, match="fails on a motion it was tried on: ValueError: a gap of"):
+            load_effects(path)
+    else:
+        assert "gap" in load_effects(path)
+
+
+def test_an_action_is_no_function_of_the_crush_unless_it_says_so():
+    """What still acts where a spring is spent may be its other springs: a memory, a factor, a damper is none."""
+    action = Action("spring.hysteresis", "N", "memory", 0, Coefficient(1.0), 1.0)
+    assert [action.outlasts(SimpleNamespace(acts_when_spent=what)) for what in (NOTHING, SPRINGS, ALL)] == [0, 0, 1]
+    elastic = replace(action, kind="element", of_crush_only=True)
+    assert [elastic.outlasts(SimpleNamespace(acts_when_spent=what)) for what in (NOTHING, SPRINGS, ALL)] == [0, 1, 1]

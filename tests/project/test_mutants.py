@@ -1,14 +1,14 @@
 """The tool behind docs/mutants.md: its mutants are one line each, and judged by tests that there are."""
 
 import ast
-import importlib.util
+import sys
 
 import pytest
 from helpers_paths import PACKAGES, ROOT
 
-SPEC = importlib.util.spec_from_file_location("mutants", ROOT / "tools" / "mutants.py")
-mutants = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(mutants)
+sys.path.append(str(ROOT / "tools"))
+import mutant_judges  # noqa: E402
+import mutants  # noqa: E402
 
 
 def test_a_seed_draws_the_same_of_every_part():
@@ -24,7 +24,6 @@ def test_each_changes_one_line_into_code_that_can_be_read():
         assert lines[mutant.line - 1] == mutant.before != mutant.after
         lines[mutant.line - 1] = mutant.after
         ast.parse("\n".join(lines))
-        assert mutants.judges(mutant) and all((ROOT / test).exists() for test in mutants.judges(mutant))
 
 
 @pytest.mark.parametrize(
@@ -48,3 +47,62 @@ def test_messages_and_docstrings_are_left_alone(tmp_path, monkeypatch):
     monkeypatch.setattr(mutants, "SOURCES", tmp_path)
     (tmp_path / "one.py").write_text('"""Of 3 + 4."""\n\n\ndef f(x):\n    """Not 2."""\n    raise ValueError(x + 1)\n')
     assert mutants.mutants_of("core", tmp_path / "one.py") == []
+
+
+CODE = """\
+LIMIT = 3.0
+
+
+class Ones:
+    wide: int = 2
+
+    def far(self, x):
+        return x > LIMIT and (
+            x
+            < 9.0
+        )
+
+
+def near(x, most=1.0):
+    return x < most
+"""
+
+
+@pytest.fixture
+def code(tmp_path, monkeypatch):
+    """A file, and tests of it: one executes `far`, one `near`, each quicker than the one before."""
+    inside = tmp_path / "crash_estimator" / "crash_estimator"
+    inside.mkdir(parents=True)
+    (inside / "one.py").write_text(CODE)
+    monkeypatch.setattr(mutant_judges, "SOURCES", tmp_path)
+    path = inside.relative_to(tmp_path) / "one.py"
+    tests = {
+        "test_a.py::test_far": mutant_judges.Test(0.3, {str(path): 1 << 8 | 1 << 10}),
+        "test_a.py::test_near": mutant_judges.Test(0.2, {str(path): 1 << 15}),
+        "test_b.py::test_other": mutant_judges.Test(0.1, {}),
+    }
+    yield lambda line: [test.partition("::")[2] for test in mutant_judges.judges(path, line, tests)]
+    mutant_judges._place.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("line", "judged_by"),
+    [
+        (15, ["test_near", "test_far"]),  # who executes it, then the others of that file
+        (9, ["test_far", "test_near"]),  # a line of a statement of several
+        (1, ["test_far", "test_near"]),  # a constant: who executes a line with its name, then its file
+        (14, ["test_near", "test_far"]),  # what a default says is so in the function
+        (5, ["test_near", "test_far"]),  # a field that no line names: its file, quickest first
+    ],
+)
+def test_a_line_is_judged_by_the_tests_that_execute_it(code, line, judged_by):
+    assert code(line) == judged_by
+
+
+def test_the_page_keeps_what_other_seeds_gave():
+    mutant = mutants.drawn(5, seed=1)[0]
+    of_one = mutants.section([mutants.Verdict(mutant, "")], 1, 200)
+    of_two = mutants.section([mutants.Verdict(mutant, "test_x.py::test_y")], 2, 200)
+    both = mutants.page(of_two, mutants.page(of_one, ""))
+    assert "0 of 1 caught, 0%" in both and "1 of 1 caught, 100%" in both and both.index("Seed 1") < both.index("Seed 2")
+    assert mutants.page(of_one, both) == both

@@ -57,6 +57,12 @@ def test_the_date_of_a_test_is_that_of_its_stamps(tmp_path, date, second):
     assert_array_equal(again.time_ns, recording.time_ns)
 
 
+def test_a_sign_may_be_said_where_nothing_is_turned(tmp_path):
+    recording = read_source(write(tmp_path, description=YAML.replace("sign: -1", "sign: 1")))
+    assert_allclose(recording.column("rib_ay")[1], 9.80665)
+    assert not recording.test.channels[0].source.endswith("sign turned")
+
+
 def test_a_test_without_a_date_has_stamps_of_1970(tmp_path):
     recording = read_source(write(tmp_path))
     assert recording.test.impact_ns == 0 and time_zero_ns(recording) == 2 * 10**9

@@ -1,10 +1,13 @@
 """EV5 as NHTSA's guide allows it and as laboratories submit it: headers with holes, values alone."""
 
+import math
+
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from test_import_nhtsa import SENSORS, record, write_folder
 
 from crash_replay.readers import read_source
+from crash_replay.readers.ev5 import Header
 from crash_replay.recording import RecordingError
 
 
@@ -90,3 +93,36 @@ def test_the_header_is_read_in_its_folder_or_in_data_and_nowhere_else(tmp_path):
     (tmp_path / "plain" / "DATA").write_text("a file")
     with pytest.raises(RecordingError):
         read_source(tmp_path / "plain")
+
+
+@pytest.mark.parametrize(
+    ("angle", "along"),
+    [
+        (0.0, True),
+        (180.0, True),
+        (0.9, True),
+        (359.5, True),
+        (180.9, True),
+        (1.2, False),
+        (178.5, False),
+        (90.0, False),
+    ],
+)
+def test_vehicles_meet_along_one_line_where_their_axes_agree_within_two_in_ten_thousand(angle, along):
+    """Only then their momenta along x are compared."""
+    off = 1.0 - abs(math.cos(math.radians(angle)))
+    assert Header("1", "", "", "", "VTV", 90.0, angle, {}, ()).along_one_line == along == (off < 2e-4)
+
+
+def slow(seconds: float) -> list:
+    return [(made._replace(step=seconds * 1e6), values) for made, values in SENSORS[:3]]
+
+
+@pytest.mark.parametrize(("seconds", "read"), [(9.5, True), (10.5, False)])
+def test_a_curve_that_is_sampled_too_seldom_is_left_out(tmp_path, seconds, read):
+    """Seldomer than every ten seconds is no crash."""
+    if not read:
+        with pytest.raises(RecordingError):
+            read_source(write_folder(tmp_path, slow(seconds)))
+        return
+    assert read_source(write_folder(tmp_path, slow(seconds))).sample_period == pytest.approx(seconds)

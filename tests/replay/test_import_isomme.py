@@ -236,3 +236,19 @@ def test_a_mass_is_a_number_above_0(stated, masses):
     rib = SimpleNamespace(code="1RIBS", channel=SimpleNamespace(body="driver_rib"))
     header = SimpleNamespace(get={"mass test object 1": stated}.get)
     assert _masses(header, [track, rib]) == masses
+
+
+def test_a_channel_of_one_value_has_no_rate_and_costs_only_itself(tmp_path):
+    recording = read_source(write_folder(tmp_path, [*FILES[:3], channel_file("10ENGN000000ACXP", [1])]))
+    assert "engine_ax" not in recording.test.channel_names and "car_ax" in recording.test.channel_names
+    assert "left out, sampled at another rate than 10000 Hz: engine_ax" in recording.test.notes
+
+
+@pytest.mark.parametrize(
+    ("letter", "cfc"),
+    [*zip("ABCD", (1000, 600, 180, 60)), *zip("EFGH", (1000, 600, 180, 60)), ("L", 20), *zip("0PSX", [None] * 4)],
+)
+def test_the_last_letter_is_the_class_of_the_filter(letter, cfc):
+    """ISO/TS 13499: A to D are filtered by SAE J211's phaseless filter, E to H by another one, P before sampling."""
+    name = channel_of(f"11HEADCG00H3ACX{letter}", "", several_objects=False).name
+    assert name == "front_left_head_ax" + (f"_cfc{cfc}" if cfc else "")

@@ -74,6 +74,16 @@ def test_of_two_sensors_the_momentum_tells_which_is_wrong(tmp_path):
     assert any("two sensors contradict each other, which is right is not known" in note for note in alone.test.notes)
 
 
+def test_a_car_whose_sensors_contradict_each_other_bears_no_witness(tmp_path):
+    """Both cars have a loose sensor and a sound one, whose mean would just bear out the other car's loose one."""
+    records = [r for r in two_cars() if r[0].split("|")[1] in ("5", "7", "10", "11")]
+    records[3] = (records[3][0], records[3][1] * 5.0)
+    recording = read_source(write_two_cars(tmp_path / "two", records=records))
+    undecided = [note for note in recording.test.notes if "which is right is not known" in note]
+    assert [note.partition(":")[0] for note in undecided] == ["vehicle1_car", "vehicle2_car"]
+    assert not any(note.startswith("outlier") for note in recording.test.notes)
+
+
 def test_signs_and_vehicles_that_face_each_other(folder, cars, tmp_path):
     names = tmp_path / "names.yaml"
     names.write_text(

@@ -291,3 +291,25 @@ def test_folder_without_curves_or_with_two_headers(tmp_path):
     (tmp_path / "v98.ev5").write_text("")
     with pytest.raises(RecordingError, match="expected one .EV5 header, found v98.ev5, v99.EV5"):
         read_source(tmp_path)
+
+
+@pytest.mark.parametrize(("share", "said"), [(1.0, "balanced"), (0.5, "NOT balanced")])
+def test_the_force_on_the_barrier_is_held_against_the_cars_momentum(tmp_path, share, said):
+    """1500 kg (as the header of `write_folder` has it), of 1000 g for 0.3 ms: 2.5 m/s or so by the trapezoid."""
+    car = [record(k, f"FLOOR {side} X", [0, 0, -1000, -1000, -1000], location=f"FL{side[0]}R")
+           for k, side in ((2, "LEFT"), (3, "RIGHT"))]  # fmt: skip
+    force = [0, 0, *[-share * 1500 * 1000 * G] * 3]
+    cell = record(20, "BARRIER A-01 Fx", force, "LC", unit="NWT", vehicle=0)
+    notes = read_source(write_folder(tmp_path, [*car, cell])).test.notes
+    (momentum,) = [note for note in notes if note.startswith("momentum")]
+    assert momentum.endswith(f"apart: {said}") or f": {said}: " in momentum
+
+
+def test_what_counts_is_how_long_a_test_is_not_how_late(tmp_path):
+    """10 s after time zero, at a microsecond, is the ten millionth sample, but the first of this test."""
+    late = [(made._replace(first=9_999_999, last=10_000_003, step=1.0), values) for made, values in SENSORS[1:3]]
+    folder = write_folder(tmp_path, late)
+    for made, values in late:
+        rows = (f"{(9_999_999 + k) * 1e-6:.6f}\t{value:.6f}\n" for k, value in enumerate(values))
+        (folder / f"v99.{made.number:03d}").write_text("".join(rows))
+    assert read_source(folder).time_ns[0] == 9_999_999_000

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers_ev5 import two_cars, write_two_cars
+from helpers_ev5 import MASSES, two_cars, write_two_cars
 from helpers_uds import CODES, uds_file, write_uds
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -132,3 +132,15 @@ def test_words_of_the_library_are_its_codes():
             by_words.setdefault(words, code)
         assert len(by_words) > 5 and all(code_of(words) == code for words, code in by_words.items())
         assert code_of("NO SUCH WORDS") == "NO SUCH WORDS"
+
+
+def test_what_a_barrier_weighs_is_no_cars_mass(tmp_path, monkeypatch):
+    """Component 0 is what the car runs into; a file of one of its sensors states a weight as every other does."""
+    record, values = records()[3]
+    cell = "|".join(["0", *record.split("|")[1:]]).replace("|4|", "|40|", 1)
+    monkeypatch.setitem(MASSES, 0, 80_000.0)
+    made = uds_file(cell.split("|"), values, 7292, "IEEE")
+    folder = write_uds(tmp_path / "uds", [records()[3]])
+    (folder / "v07292aa0.040.uds").write_bytes(made)
+    notes = "\n".join(read_source(folder).test.notes)
+    assert "test mass 1200 kg" in notes and "80000" not in notes

@@ -1,0 +1,31 @@
+"""The law of an element as its estimates have it: what is drawn, and what a free run goes by."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers_estimation import ESTIMATED, oscillator, oscillator_recording
+from numpy.testing import assert_allclose
+
+from crash_estimator.core.characteristic import characteristics
+from crash_estimator.core.fold import run
+from crash_estimator.core.methods import make_estimator
+from crash_estimator.core.structure import Coefficient
+
+
+@pytest.mark.parametrize("tension", [True, False])
+def test_a_constant_stiffness_is_a_line_over_the_crush_it_was_found_on(tension):
+    """As far to the side of tension, where a contact carries nothing; the damper beside it is no part of it."""
+    recording = oscillator_recording(stiffness=2.0e4, damping=50.0)
+    structure = oscillator(
+        replace(ESTIMATED, shape="constant"), Coefficient(0.0, estimated=True, std=100.0), tension=tension
+    )
+    estimator = make_estimator(structure, recording.test, "kalman")
+    estimates = list(run(estimator, recording.samples()))
+    (found,) = characteristics(structure, estimator.description, estimates)
+    stiffness = estimates[-1].parameters[estimator.description.parameters.index("spring.stiffness")]
+    reach = np.abs(recording.column("travel")[recording.time_ns >= 0]).max()
+    assert_allclose(found.crush, [-reach, 0.0, reach])
+    assert_allclose(found.force, [-stiffness * reach if tension else 0.0, 0.0, stiffness * reach])
+    if tension:
+        assert_allclose([stiffness, found.damping], [2.0e4, 50.0], rtol=0.05)

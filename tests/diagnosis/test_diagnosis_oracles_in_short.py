@@ -1,0 +1,47 @@
+"""The oracles of the diagnosis on a short record of one effect of each kind: quick also where nothing is compiled."""
+
+import numpy as np
+import pytest
+from test_diagnosis_oracles import (
+    EVERY_EFFECT,
+    NEAR,
+    ON_A_LINE,
+    SPEED,
+    assert_derivatives_agree,
+    motion,
+    on_a_line,
+    shown,
+    structure,
+)
+
+from crash_replay.recording import Channel, Recording, Test
+
+RATE = 4000.0
+KINDS = [effect for effect in EVERY_EFFECT if effect.type in (
+    "viscous_damping", "hysteresis", "plastic_unloading", "load_path", "added_mass", "channel_gain",
+)]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    """Until the striker is on its way back."""
+    before, after = np.arange(-40, 0), np.arange(0, 260)
+    values = np.concatenate([np.zeros((len(before), 3)), motion(after / RATE)[:, :3]])
+    values += np.random.default_rng(1).normal(size=values.shape) * np.array([2.0, 2.0, 50.0])
+    channels = (
+        Channel("striker_ax", "acceleration", "striker", "x"),
+        Channel("plate_ax", "acceleration", "plate", "x"),
+        Channel("wall_fx", "force", "wall", "x"),
+    )
+    time_ns = (np.concatenate([before, after]) * 1e9 / RATE).astype(np.int64)
+    return Recording(Test("striker", channels, initial_velocity={"striker": SPEED}), time_ns, values)
+
+
+@pytest.mark.parametrize("effect", KINDS, ids=shown)
+def test_the_derivatives_of_the_outputs_are_their_finite_differences(effect, recording):
+    assert_derivatives_agree(structure(effect), recording, NEAR[effect.type])
+
+
+@pytest.mark.parametrize("effect, what", ON_A_LINE[1::3], ids=shown)
+def test_so_they_are_where_the_spring_is_spent(effect, what, recording):
+    assert_derivatives_agree(on_a_line(effect, what), recording, NEAR[effect.type])

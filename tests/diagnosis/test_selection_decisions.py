@@ -1,0 +1,133 @@
+"""What the selection does with what its fits have found: the fits are made up, what follows from them is judged."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from crash_estimator.core.diagnosis import THRESHOLDS
+from crash_estimator.core.diagnosis.selection import assumptions, forward_selection, pair_search
+from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
+from crash_estimator.core.diagnosis.selection.fitted_model import forces_jump
+from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
+
+
+def model(left: float, additions: int = 0, evidence: float = 0.0) -> SimpleNamespace:
+    """One that leaves a mean square of residuals, in the variance of the noise, with so many additions."""
+    fit = SimpleNamespace(problem=SimpleNamespace(noise_is_inflated=False), evidence=evidence, additions=additions)
+    residuals = SimpleNamespace(mean_square=left)
+    return SimpleNamespace(fit=fit, residuals=residuals, white=left < 1.1, additions=("one",) * additions, records=())
+
+
+def step(before: SimpleNamespace, gain: float = 500.0) -> SelectionStep:
+    addition = SimpleNamespace(effect=SimpleNamespace(name="friction", acts_on="element"), key=("friction", "spring"))
+    return SelectionStep(before, [CandidateFit(addition, gain, SimpleNamespace(evidence=gain))])
+
+
+@pytest.mark.parametrize(
+    ("left", "believed"),
+    [
+        ((100.0, 50.0, 10.0, 1.0), 3),  # together they leave noise, and the first ones do not
+        ((100.0, 50.0, 3.0, 1.0), 2),  # the first ones leave next to nothing
+        ((100.0, 50.0, 10.0, 9.0), 2),  # all of them leave more than noise
+        ((100.0, 50.0, 10.0), 2),  # no more than are believed
+    ],
+)
+def test_how_many_additions_are_believed_together(left, believed):
+    models = [model(mean_square, k) for k, mean_square in enumerate(left)]
+    path = assumptions.SelectionPath(None, [step(m) for m in models[:-1]], models[-1], 0, models[-1].fit, ())
+    found = assumptions.first_believed(path)
+    assert len(found.final.additions) == found.as_recorded.additions == believed
+    assert len(found.steps) == min(believed + 1, len(models) - 1)
+
+
+@pytest.mark.parametrize(("left", "out_of_time"), [(1.0, False), (1.5, True)])
+def test_what_leaves_noise_or_has_no_time_is_not_searched_in_a_smaller_band(monkeypatch, left, out_of_time):
+    path = assumptions.SelectionPath(None, [], model(left), 0, None, ())
+    monkeypatch.setattr(assumptions, "_selected", lambda *given: path)
+    monkeypatch.setattr(assumptions, "out_of_time", lambda: out_of_time)
+    assert assumptions.select(None, (), {}) is path  # the band would be asked of its fit, which is none
+
+
+@pytest.mark.parametrize(("wanted", "out_of_time", "searches"), [(True, False, 2), (False, False, 1), (True, True, 1)])
+def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypatch, wanted, out_of_time, searches):
+    begun, given = [], model(1.5)
+    made_up = {
+        "forward_selection": lambda *given: begun.append(given) or ([step(given[2])], given[2]),
+        "measure_magnitudes": lambda *given: None,
+        "fit_model": lambda *given: model(1.5),
+        "drift_of": lambda fit: SimpleNamespace(constant=True),
+        "analyse": lambda fit: None,
+        "_wants_finer_curves": lambda *given: wanted,
+        "up_to_the_least_error": lambda steps, final, present: (steps, final),
+        "out_of_time": lambda: out_of_time,
+    }
+    for name, instead in made_up.items():
+        monkeypatch.setattr(assumptions, name, instead)
+    assumptions._with_curves_as_fine_as_needed(SimpleNamespace(structure=None, records=()), given, {})
+    assert len(begun) == searches
+
+
+@pytest.mark.parametrize(("knots", "goes_on"), [((0.0, 0.1), True), ((0.0, 0.1, 0.2), False)])
+def test_a_fit_in_doubt_goes_on_from_the_one_that_was_not_where_the_curves_are_the_same(monkeypatch, knots, goes_on):
+    """An element may have no curve of its own: there is nothing to compare then."""
+    layout = lambda knots: SimpleNamespace(  # noqa: E731
+        links=[SimpleNamespace(curve=None), SimpleNamespace(curve=SimpleNamespace(knots=np.array(knots)))]
+    )
+    problem = SimpleNamespace(layout=layout((0.0, 0.1)), widened=lambda *given: 0, moved=lambda *given: "there")
+    before = model(1.5)
+    before.fit.layout, before.fit.theta, before.fit.trajectories = layout(knots), None, None
+    starts = []
+    monkeypatch.setattr(assumptions, "make_problem", lambda *given: problem)
+    monkeypatch.setattr(assumptions, "fit_model", lambda magnitudes, records, additions, start: starts.append(start))
+    assumptions._in_doubt(SimpleNamespace(records=()), before)
+    assert starts == ["there" if goes_on else None]
+
+
+@pytest.mark.parametrize(("together", "pairs"), [(300.0, 1), (50.0, 0)])
+def test_an_effect_on_two_elements_is_tried_on_both(monkeypatch, together, pairs):
+    """Neither explains enough alone; what the second one adds to the first must count for a pair."""
+    given = model(100.0)
+    one, other = (step(given).candidates[0] for _ in range(2))
+    monkeypatch.setattr(pair_search, "added", lambda *given: (None, model(50.0, 1)))
+    monkeypatch.setattr(pair_search, "fit_model", lambda *given: model(1.0, 2, evidence=together))
+    found = list(pair_search._of_one_effect(SimpleNamespace(), given, [one, other]))
+    assert len(found) == pairs
+    for pair in found:
+        assert [len(made.before.additions) for made in pair.path] == [0, 1] and pair.path[1].best.gain == together
+
+
+@pytest.mark.parametrize(("gains", "added"), [((500.0, 400.0, 0.0), 2), ((0.0,), 0), ((500.0,) * 9, None)])
+def test_effects_are_added_one_by_one_as_long_as_they_gain_anything(monkeypatch, gains, added):
+    """And no more of them than the most steps there are, whatever they gain."""
+    left = iter(gains)
+    monkeypatch.setattr(forward_selection, "selection_step", lambda m, e, before, path: step(before, next(left)))
+    monkeypatch.setattr(forward_selection, "_without", lambda model, found: model)
+    monkeypatch.setattr(
+        forward_selection,
+        "added",
+        lambda m, r, before, best: (m, model(0.9 * (before.residuals.mean_square), len(before.additions) + 1)),
+    )
+    monkeypatch.setattr(forward_selection, "analyse", lambda fit: SimpleNamespace(mean_square=1.0))
+    monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final, present: (path, final))
+    path, final = forward_selection._one_by_one(None, {}, model(100.0), [], 0)
+    assert len(final.additions) == len(path) - 1 == (THRESHOLDS.most_steps if added is None else added)
+
+
+FALLS_TO_ZERO = dict(tension=False, parallel=(), remembering=(), damping=None, known_damping=0.0)
+
+
+@pytest.mark.parametrize(
+    ("link", "jumps"),
+    [
+        ({}, False),
+        ({"parallel": ("friction",)}, True),
+        ({"remembering": ("bouc_wen",)}, True),
+        ({"damping": 3}, True),
+        ({"known_damping": 900.0}, True),
+        ({"damping": 3, "tension": True}, False),  # it never separates
+    ],
+)
+def test_what_makes_a_force_jump_where_a_contact_ends(link, jumps):
+    layout = SimpleNamespace(links=[SimpleNamespace(**FALLS_TO_ZERO | link)])
+    assert bool(forces_jump(layout)) == jumps
