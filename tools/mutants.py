@@ -166,6 +166,7 @@ PAGE = """\
 Made by `make mutants`: one operator, condition or number changed. The tests that execute the line judge, quickest
 first, for {patience:g} s at most, but for those that take {slow:g} s or more and for what they do in other processes
 (`tools/mutant_judges.py`). What numba compiles is judged as Python.
+What is not caught stays so until it is judged again (`--again`), though a test was written for it since.
 """
 SECTION = """\
 ## Seed {seed}: {what}

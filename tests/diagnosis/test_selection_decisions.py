@@ -35,7 +35,7 @@ def step(before: SimpleNamespace, gain: float = 500.0) -> SelectionStep:
 )
 def test_how_many_additions_are_believed_together(left, believed):
     models = [model(mean_square, k) for k, mean_square in enumerate(left)]
-    path = assumptions.SelectionPath(None, [step(m) for m in models[:-1]], models[-1], 0, models[-1].fit, ())
+    path = assumptions.SelectionPath(None, [step(m) for m in models[:-1]], models[-1], 0, models[-1].fit, (), 36)
     found = assumptions.first_believed(path)
     assert len(found.final.additions) == found.as_recorded.additions == believed
     assert len(found.steps) == min(believed + 1, len(models) - 1)
@@ -43,7 +43,7 @@ def test_how_many_additions_are_believed_together(left, believed):
 
 @pytest.mark.parametrize(("left", "out_of_time"), [(1.0, False), (1.5, True)])
 def test_what_leaves_noise_or_has_no_time_is_not_searched_in_a_smaller_band(monkeypatch, left, out_of_time):
-    path = assumptions.SelectionPath(None, [], model(left), 0, None, ())
+    path = assumptions.SelectionPath(None, [], model(left), 0, None, (), 36)
     monkeypatch.setattr(assumptions, "_selected", lambda *given: path)
     monkeypatch.setattr(assumptions, "out_of_time", lambda: out_of_time)
     assert assumptions.select(None, (), {}) is path  # the band would be asked of its fit, which is none
@@ -54,7 +54,7 @@ def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypa
     begun, given = [], model(1.5)
     made_up = {
         "forward_selection": lambda *given: begun.append(given) or ([step(given[2])], given[2]),
-        "measure_magnitudes": lambda *given: None,
+        "measure_magnitudes": lambda *given: SimpleNamespace(cells=72),
         "fit_model": lambda *given: model(1.5),
         "drift_of": lambda fit: SimpleNamespace(constant=True),
         "analyse": lambda fit: None,
@@ -64,7 +64,8 @@ def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypa
     }
     for name, instead in made_up.items():
         monkeypatch.setattr(assumptions, name, instead)
-    assumptions._with_curves_as_fine_as_needed(SimpleNamespace(structure=None, records=()), given, {})
+    magnitudes = SimpleNamespace(structure=None, records=(), cells=36)
+    assumptions._with_curves_as_fine_as_needed(magnitudes, given, {}, ())
     assert len(begun) == searches
 
 
@@ -91,7 +92,7 @@ def test_an_effect_on_two_elements_is_tried_on_both(monkeypatch, together, pairs
     one, other = (step(given).candidates[0] for _ in range(2))
     monkeypatch.setattr(pair_search, "added", lambda *given: (None, model(50.0, 1)))
     monkeypatch.setattr(pair_search, "fit_model", lambda *given: model(1.0, 2, evidence=together))
-    found = list(pair_search._of_one_effect(SimpleNamespace(), given, [one, other]))
+    found = pair_search.two_of_one_effect(SimpleNamespace(), given, [one, other])
     assert len(found) == pairs
     for pair in found:
         assert [len(made.before.additions) for made in pair.path] == [0, 1] and pair.path[1].best.gain == together
@@ -101,7 +102,8 @@ def test_an_effect_on_two_elements_is_tried_on_both(monkeypatch, together, pairs
 def test_effects_are_added_one_by_one_as_long_as_they_gain_anything(monkeypatch, gains, added):
     """And no more of them than the most steps there are, whatever they gain."""
     left = iter(gains)
-    monkeypatch.setattr(forward_selection, "selection_step", lambda m, e, before, path: step(before, next(left)))
+    monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda m, e, before, path: step(before, next(left)))
+    monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done: done)
     monkeypatch.setattr(forward_selection, "_without", lambda model, found: model)
     monkeypatch.setattr(
         forward_selection,
