@@ -40,7 +40,8 @@ EVIDENCE = Evidence(1, False, STANDS_STILL, left(0.2, 10.0, 0.5), left(0.05, 2.0
 
 MENDED = {"after": left(0.04, 0.5)}
 """Where the model before leaves little."""
-LITTLE = left(0.009, 1.0)
+LITTLE, DROWNED = left(0.009, 1.0), left(0.009, 0.13)
+"""Within the tolerance; and less than the noise as well, which is 0.1."""
 
 
 @pytest.mark.parametrize(
@@ -62,7 +63,9 @@ LITTLE = left(0.009, 1.0)
         ({"white": True, "by_first": 0.96}, DEFAULT, "effect_missing", False),  # of little weight beside that
         ({"after": left(0.05, 6.0)}, DEFAULT, "unexplained", False),  # it explains two thirds
         ({"added": 0, "before": LITTLE, "after": LITTLE}, DEFAULT, "adequate", True),
-        ({"before": LITTLE, "after": LITTLE}, DEFAULT, "adequate", True),  # what was added explains none of it
+        ({"before": LITTLE, "after": LITTLE}, DEFAULT, "unexplained", False),  # something was added, to no avail
+        ({"before": DROWNED, "after": DROWNED}, DEFAULT, "adequate", True),
+        ({"before": LITTLE, "after": LITTLE, "added": 0, "white": True}, DEFAULT, "unexplained", False),  # and varies
         ({"added": 0, "after": left(0.05, 1.0)}, DEFAULT, "unexplained", False),
         ({"before": left(0.04, 1.0), **MENDED}, DEFAULT, "effect_missing", False),
         ({"before": left(0.04, 1.0), **MENDED}, Tolerance(of_peak=0.05), "adequate", True),

@@ -59,6 +59,11 @@ class Left:
         return min((one.rating for one in self.channels if one.rating is not None), default=None)
 
     @property
+    def is_less_than_noise(self) -> bool:
+        """What is left beside the noise."""
+        return self.rms**2 < 2.0 * self.noise**2
+
+    @property
     def band(self) -> str:
         return f"CFC {self.cfc}" if self.cfc else "all sampled"
 

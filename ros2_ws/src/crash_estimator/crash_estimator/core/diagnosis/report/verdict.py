@@ -37,9 +37,9 @@ class Verdict(NamedTuple):
 
 
 def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
-    """`adequate`: nothing significant is missing, or what is left of the model as given is within the tolerance and
-    nothing is named; `effect_missing`: what is named beats its rivals and takes a large share of the misfit away; else
-    `unexplained`."""
+    """`adequate`: nothing significant is missing, or nothing is named and what is left of the model as given is within
+    the tolerance, and no candidate explains any of it or it is less than the noise; `effect_missing`: what is named
+    beats its rivals and takes a large share of the misfit away; else `unexplained`."""
     if tolerance.stated and tolerance.admits(evidence.before):
         return Verdict(ADEQUATE, True)
     if evidence.noise:
@@ -48,7 +48,9 @@ def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
     within = tolerance.admits(evidence.after)
     if _explains(evidence) and _stands_still(evidence) and (within or _beats_its_rivals(evidence.ranking)):
         return Verdict(EFFECT_MISSING, within)
-    return Verdict(ADEQUATE, True) if tolerance.admits(evidence.before) else Verdict(UNEXPLAINED, False)
+    nothing_to_add = not (evidence.added or evidence.white) and _stands_still(evidence)
+    little = tolerance.admits(evidence.before) and (nothing_to_add or evidence.before.is_less_than_noise)
+    return Verdict(ADEQUATE, True) if little else Verdict(UNEXPLAINED, False)
 
 
 def _stands_still(evidence: Evidence) -> bool:
