@@ -10,11 +10,11 @@ from crash_estimator.model_file import load_model
 from crash_replay.bag import read_bag
 
 OWN = {
-    "frontal_single": "bags/frontal_single.model.yaml",
-    "frontal_engine_cab": "bags/frontal_engine_cab.model.yaml",
-    "frontal_abrupt": "bags/frontal_abrupt.model.yaml",
-    "side_mdb_door_car": "bags/side_mdb_door_car.model.yaml",
-    "side_abrupt": "bags/side_mdb_door_car.model.yaml",
+    "frontal_single": "bags/frontal_single.whole.yaml",
+    "frontal_engine_cab": "bags/frontal_engine_cab.whole.yaml",
+    "frontal_abrupt": "bags/frontal_abrupt.whole.yaml",
+    "side_mdb_door_car": "bags/side_mdb_door_car.whole.yaml",
+    "side_abrupt": "bags/side_mdb_door_car.whole.yaml",
     "side_dummy_padded": "side_dummy",
     "side_dummy_unpadded": "side_dummy",
     "impactor_single": "impactor_single",
