@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 from crash_estimator.core.characteristic import Characteristic
 from crash_estimator.core.compare_tests import coarser, compare_noise_models, compare_tests, curve_difference, spectrum
-from crash_estimator.core.estimators.gauss_newton import NoiseModel
+from crash_estimator.core.estimators.noise_model import NoiseModel
 from crash_estimator.core.structure import ModelError
 from crash_replay.recording import RecordingError
 

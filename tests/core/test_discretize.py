@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import expm
 
 from crash_estimator.core.discretize import exponential, modes, to_continuous, to_discrete
-from crash_estimator.core.estimators.gauss_newton import NoiseModel
+from crash_estimator.core.estimators.noise_model import NoiseModel
 from crash_estimator.core.structure import ModelError
 
 AC = np.array([[0.0, 1.0], [-600.0, -1.0]])  # figure 4.2: K/M = 600, C/M = 1

@@ -7,7 +7,8 @@ import pytest
 from helpers_estimation import oscillator, oscillator_recording
 from numpy.testing import assert_allclose, assert_array_equal
 
-from crash_estimator.core.estimators.gauss_newton import LARGEST_ROOT, GaussNewton, NoiseModel, Past, stable
+from crash_estimator.core.estimators.gauss_newton import GaussNewton, Past
+from crash_estimator.core.estimators.noise_model import LARGEST_ROOT, NoiseModel, stable
 from crash_estimator.core.estimators.update import Theta
 from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator

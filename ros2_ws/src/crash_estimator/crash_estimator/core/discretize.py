@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .estimators.gauss_newton import NoiseModel
+from .estimators.noise_model import NoiseModel
 from .structure import ModelError
 
 TERMS = 18

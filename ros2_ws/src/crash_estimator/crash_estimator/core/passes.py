@@ -15,7 +15,8 @@ import numpy as np
 from crash_replay.recording import Recording
 
 from .estimate import Estimate
-from .estimators.gauss_newton import GaussNewton, NoiseModel
+from .estimators.gauss_newton import GaussNewton
+from .estimators.noise_model import NoiseModel
 
 SETTLED = 0.05
 """Of its standard deviation: a pass that moves no parameter by more has settled. A twentieth does not show in an

@@ -26,12 +26,10 @@ from ..regression import Regression
 from ..regressor_errors import MotionErrors
 from ..structure import ModelError
 from .lag import Walking, followed, of_first, with_lag
+from .noise_model import LARGEST_ROOT, NoiseModel, stable
 from .rls import NOISE_FLOOR, Rls, RlsState
 from .rls import THESIS as THESIS_RLS
 from .update import Theta, Update
-
-LARGEST_ROOT = 0.98
-"""Of D and A, in modulus: at 1 the noise model would integrate, beyond it the predictor diverges."""
 
 COEFFICIENT_STD = 1.0
 """Of the coefficients d and a before the first sample; they start from 0, white noise. A slow error has d_1 near -1."""
@@ -64,15 +62,6 @@ class GaussNewtonState(NamedTuple):
     past: tuple[Past, ...]  # the latest first
     learning: np.ndarray  # (q,) whether the equation's d and a are estimated yet
     lag: Walking = None  # of theta alone
-
-
-class NoiseModel(NamedTuple):
-    """D(B) e = A(B) eps of one equation."""
-
-    d: np.ndarray  # (p,)
-    a: np.ndarray  # (q,)
-    covariance: np.ndarray  # (p + q, p + q) of d and a
-    variance: float  # of eps, (m/s^2)^2 or N^2
 
 
 @dataclass(frozen=True)
@@ -127,7 +116,7 @@ class GaussNewton:
             return GaussNewtonState(rls, (), np.array(without))
         if [(len(model.d), len(model.a)) for model in self.start] != self.orders(equations):
             raise ModelError(
-                f"start of gauss_newton must be one noise model of orders p, q an equation, {equations} in all"
+                f"start of gauss_newton must be one noise model of orders p, q for each of {equations} equations"
             )
         return GaussNewtonState(self._begun(rls), (), np.full(equations, True))
 
@@ -286,16 +275,3 @@ class GaussNewton:
             wide, self.forgetting, self.memory,
             noise_floor=self.noise_floor, forget_excited=self.forget_excited, constrained=self.constrained,
         )  # fmt: skip
-
-
-def stable(coefficients: np.ndarray, limit: float = LARGEST_ROOT) -> np.ndarray:
-    """Coefficients c of 1 + c_1 B + ... with every root r of z^n + c_1 z^(n-1) + ... at most `limit` in modulus.
-
-    All roots are drawn in by the same factor f, which multiplies c_i by f^i and keeps the shape of the spectrum.
-    """
-    if not len(coefficients) or np.isinf(limit) or np.abs(coefficients).sum() < limit ** len(coefficients):
-        return coefficients  # by Rouche's theorem all roots are within
-    largest = np.abs(np.roots(np.concatenate([[1.0], coefficients]))).max()
-    if largest <= limit:
-        return coefficients
-    return coefficients * (limit / largest) ** np.arange(1, len(coefficients) + 1)

@@ -61,7 +61,7 @@ class Left:
     @property
     def is_less_than_noise(self) -> bool:
         """What is left beside the noise."""
-        return self.rms**2 < 2.0 * self.noise**2
+        return self.rms**2 - self.noise**2 < self.noise**2
 
     @property
     def band(self) -> str:

@@ -36,6 +36,7 @@ CELLS = 36
 """Of a free curve over its crush scale: 1 cm of a crush of 0.4 m, the length of a fold of a longitudinal."""
 
 FINER_CELLS = 2 * CELLS
+"""Cells of half the width, where what is left may be folds that those are too wide for."""
 
 
 class SelectionPath(NamedTuple):

@@ -85,10 +85,10 @@ def _together(
 
 def near_the_floor(pairs: Sequence[Pair], candidates: Sequence[CandidateFit]) -> Pair | None:
     """The one that leaves next to nothing, where no candidate alone does."""
-    alone = min((analyse(one.fit).mean_square for one in _likely(candidates)[:1]), default=0.0)
-    best = min(pairs, key=lambda pair: pair.model.residuals.mean_square, default=None)
-    if best is None or alone < THRESHOLDS.near_floor:
+    leader = next(iter(_likely(candidates)), None)
+    if not pairs or leader is None or analyse(leader.fit).mean_square < THRESHOLDS.near_floor:
         return None
+    best = min(pairs, key=lambda pair: pair.model.residuals.mean_square)
     return best if best.model.residuals.mean_square < THRESHOLDS.near_floor else None
 
 

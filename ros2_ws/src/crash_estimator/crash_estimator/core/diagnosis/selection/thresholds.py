@@ -26,7 +26,8 @@ class Thresholds(NamedTuple):
     # What is left, in units of the sensors' noise
     near_floor: float = 2.0
     """Mean square below which a driven channel's error, a finer curve, or what rings, may be all that is left: to look
-    again takes as long as the first look."""
+    again takes as long as the first look. Two of one effect that leave less, as neither alone does, are taken as found:
+    what they leave is then less than the noise."""
     real_structure: float = 100.0
     """Mean square from which on no second effect is looked for at once: of a real structure none takes that."""
     out_of_reach: float = 1000.0
@@ -62,9 +63,11 @@ class Thresholds(NamedTuple):
     long_list: int = 10
     """... and where none of them leaves white noise."""
     most_hosts: int = 3
-    """Bodies that an unmodelled one is tried on, with a curve to each neighbour."""
+    """Bodies that an unmodelled one is tried on, with a curve to each neighbour; and further elements that an effect is
+    tried on beside the one where it explains most."""
     with_care: int = 3
-    """Candidates that are then fitted on by other schedules, and that are tried with a second one at once."""
+    """Candidates that are then fitted on by other schedules, and that are tried with a second one at once; and effects
+    that are tried on two elements."""
     most_profiles: int = 4
     """Slopes on which an element may unload that are looked at over their value."""
     offset_starts: int = 2
