@@ -21,7 +21,7 @@ for ending in (signal.SIGINT, signal.SIGHUP):
 
 
 NEEDS_A_GRAPH = re.compile(
-    r"\b(rclpy|crash_msgs|subprocess|stage)\b|helpers_(demo|diagnosis|domain|estimator_node|nodes|other_process|record|replay|waiting)"
+    r"\b(rclpy|crash_msgs|subprocess|stage)\b|helpers_(demo|diagnosis|domain|estimator_node|nodes|other_process|record|replay|service|waiting)"
 )
 """What a file of tests mentions that starts nodes or other processes."""
 

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import rclpy
@@ -10,6 +10,7 @@ import yaml
 from crash_msgs.msg import Misfit, Ranking, Revision, Samples, TestInfo
 from helpers_domain import own_domain
 from helpers_other_process import OtherProcesses
+from helpers_service import ask
 from helpers_waiting import PATIENCE
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -113,11 +114,7 @@ class Stage:
         return self.finals(name)[count - 1]
 
     def call(self, service: str, kind: type, **request):
-        client = self.node.create_client(kind, service)
-        self.spin_until(client.service_is_ready, f"{service} is there")
-        answer = client.call_async(kind.Request(**request))
-        self.spin_until(answer.done, f"{service} answers")
-        return answer.result()
+        return ask(self.node, kind, service, partial(self.executor.spin_once, timeout_sec=0.02), **request)
 
 
 def table(message: Revision, field: str) -> np.ndarray:

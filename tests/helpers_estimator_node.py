@@ -7,6 +7,7 @@ import sys
 import time
 from array import array
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from crash_msgs.msg import (
 )
 from helpers_domain import own_domain
 from helpers_other_process import OtherProcesses
+from helpers_service import ask
 from helpers_waiting import PATIENCE
 from numpy.testing import assert_array_equal
 from rclpy.experimental.events_executor import EventsExecutor
@@ -157,12 +159,8 @@ class Stage:
 
     def call(self, kind: type, service: str, patience: float = PATIENCE, **request):
         """The response of a service."""
-        client = self.node.create_client(kind, service)
-        self.spin_until(client.service_is_ready, f"there is a service {service}", patience)
-        call = client.call_async(kind.Request(**request))
-        self.spin_until(call.done, f"{service} answers", patience)
-        self.node.destroy_client(client)
-        return call.result()
+        look = partial(self.executor.spin_once, timeout_sec=0.02)
+        return ask(self.node, kind, service, look, patience, **request)
 
     def wait_for(self, name: str, messages: int, patience: float = PATIENCE) -> dict[str, list]:
         """What was heard of an estimator, once it has said so much about parameters, residuals and forces."""

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from tempfile import TemporaryFile
 from threading import Thread
 
@@ -13,6 +14,7 @@ import numpy as np
 import rclpy
 from crash_msgs.msg import ReplayState, Samples, TestInfo
 from helpers_domain import own_domain
+from helpers_service import ask
 from helpers_waiting import PATIENCE
 from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
@@ -24,6 +26,9 @@ from crash_replay.qos import EVERY_SAMPLE, LATCHED
 from crash_replay.recording import Channel, Recording, Test
 from crash_replay.ros_messages import samples_from_msg
 from crash_replay.ros_runtime import spin
+
+LOOK = partial(time.sleep, 0.002)
+"""s between two looks at whether something has come."""
 
 DOMAIN = own_domain()
 """Other tests, and other people's nodes, must not hear us: each test process has a domain."""
@@ -58,9 +63,11 @@ class OfTheTest:
         return self
 
     def __exit__(self, *_):
-        if self.process.poll() is None:
-            self.process.kill()
-            self.process.communicate()
+        self.process.kill()  # nothing, where it has ended
+        for pipe in (self.process.stdout, self.process.stderr):
+            if pipe:
+                pipe.close()
+        self.process.wait()
 
 
 class Replay(OfTheTest):
@@ -133,12 +140,7 @@ class Listener:
         return [(m.run, m.number + k) for m in self.messages for k in range(len(m.time_ns))]
 
     def call(self, service_type, name: str, **request):
-        client = self.node.create_client(service_type, f"replay/{name}")
-        assert client.wait_for_service(timeout_sec=PATIENCE), f"no service {name}"
-        future = client.call_async(service_type.Request(**request))
-        wait_until(future.done)
-        self.node.destroy_client(client)
-        return future.result()
+        return ask(self.node, service_type, f"replay/{name}", LOOK, **request)
 
     def __enter__(self):
         return self
@@ -156,4 +158,4 @@ def wait_until(condition, timeout: float = PATIENCE) -> None:
     limit = time.monotonic() + timeout
     while not condition():
         assert time.monotonic() < limit, "waited in vain"
-        time.sleep(0.002)
+        LOOK()

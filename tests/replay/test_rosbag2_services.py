@@ -5,7 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 from crash_msgs.srv import Burst
-from helpers_replay import Replay, some_recording, wait_until
+from helpers_replay import LOOK, Replay, some_recording, wait_until
+from helpers_service import ask
 from std_srvs.srv import Trigger
 
 from crash_replay.bag import time_zero_ns
@@ -98,11 +99,7 @@ def test_its_types_on_the_graph(bag, listener):
     from rosbag2_interfaces import srv
 
     def call(kind, name, **request):
-        client = listener.node.create_client(kind, f"/sled_a/rosbag2_player/{name}")
-        wait_until(client.service_is_ready)
-        future = client.call_async(kind.Request(**request))
-        wait_until(future.done)
-        return future.result()
+        return ask(listener.node, kind, f"/sled_a/rosbag2_player/{name}", LOOK, **request)
 
     with Replay(bag, ["__ns:=/sled_a"], start_paused=True, rosbag2_services=True) as replay:
         assert call(srv.IsPaused, "is_paused").paused

@@ -100,9 +100,10 @@ class Graph:
         return self
 
     def __exit__(self, *_) -> None:
-        self.children.__exit__()
+        # The listener goes first: a participant that ends while it hears others leave has crashed the process.
         self.executor.shutdown()
         self.listener.destroy_node()
+        self.children.__exit__()
 
     def estimator(self, name: str, model: Path | str, method: str) -> None:
         self.children.start(name, "crash_estimator", "estimator", node=name, model=str(model), method=method)
