@@ -18,9 +18,9 @@ from crash_estimator.core.structure import Coefficient, EffectSpec, ModelError
 from crash_estimator.core.structure_parts import ALL, NOTHING, SPRINGS, Action
 from crash_estimator.model_file import load_model
 
-VOCABULARY = """viscous_damping quadratic_damping coulomb_friction hysteresis rate_hardening cubic_stiffness clearance
-bottoming_out plastic_unloading load_path added_mass unmodelled_body constant_force channel_delay channel_gain
-channel_offset""".split()
+VOCABULARY = """viscous_damping quadratic_damping coulomb_friction hysteresis maxwell_element gas_cushion
+rate_hardening cubic_stiffness clearance bottoming_out plastic_unloading load_path added_mass unmodelled_body
+constant_force channel_delay channel_gain channel_offset""".split()
 DAMPERS = ("viscous_damping", "quadratic_damping", "coulomb_friction")
 FORCES = [effect for effect in EFFECTS.values() if isinstance(effect, ElementForce)]
 SMALL = st.floats(-10.0, 10.0, allow_subnormal=False)
@@ -56,48 +56,6 @@ def test_one_instant_is_the_same_row_of_the_whole_record(effect):
     whole = motion(rng.normal(0.1, 0.1, 30), rng.normal(0.0, 5.0, 30))
     rows = [effect.force(ElementMotion(*(x[k : k + 1] for x in whole)), **middle(effect)) for k in range(30)]
     assert_array_equal(np.concatenate(rows), effect.force(whole, **middle(effect)))
-
-
-HYSTERESIS = {"yield_crush": 0.02, "exponent": 2.0}
-
-
-@settings(max_examples=50, deadline=None)
-@given(way=arrays(float, 40, elements=st.floats(-0.1, 0.1, allow_subnormal=False)))
-def test_hysteresis_takes_energy_in_whatever_goes_round_and_stays_within_its_yield_force(way):
-    """Round and round the same way, what the first rounds have stored is given back, and something is always lost."""
-    closed = np.repeat(np.concatenate([way, way[:1]]), 3)
-    closed = np.tile(np.interp(np.linspace(0, 1, 2000), np.linspace(0, 1, len(closed)), closed), 3)
-    z = EFFECTS["hysteresis"].memory(closed, 0.0, **HYSTERESIS)[0]
-    work = np.cumsum(0.5 * (z[1:] + z[:-1]) * np.diff(closed))
-    assert np.abs(z).max() <= 1.0
-    assert work[-1] - work[1999] >= -1e-3 * HYSTERESIS["yield_crush"]
-
-
-def test_hysteresis_does_not_hang_on_the_rate_and_can_be_gone_on_with():
-    crush = 0.1 * np.sin(np.linspace(0.0, 12.0, 400))
-    memory = EFFECTS["hysteresis"].memory
-    whole = memory(crush, 0.0, **HYSTERESIS)[0]
-    slowly = memory(np.interp(np.linspace(0, 399, 3991), np.arange(400), crush), 0.0, **HYSTERESIS)[0][::10]
-    assert_allclose(slowly, whole, atol=2e-3)
-    start, one_by_one = 0.0, [0.0]
-    for before, now in zip(crush, crush[1:], strict=False):
-        start = memory(np.array([before, now]), start, **HYSTERESIS)[0][-1]
-        one_by_one.append(start)
-    assert_array_equal(one_by_one, whole)
-
-
-def test_hysteresis_is_in_its_limit_a_spring_behind_a_dry_slider():
-    crush = np.concatenate([np.linspace(0.0, 0.1, 500), np.linspace(0.1, 0.0, 500)])
-    z = EFFECTS["hysteresis"].memory(crush, 0.0, yield_crush=0.02, exponent=10.0)[0]
-    assert_allclose(z[:90], crush[:90] / 0.02, rtol=0.1)
-    assert_allclose(z[300:500], 1.0, atol=1e-3)
-    assert_allclose(z[-200:], -1.0, atol=1e-3)
-
-
-@pytest.mark.parametrize("far", [1e30, np.inf, np.nan])
-def test_hysteresis_of_a_motion_without_bounds_ends_at_once(far):
-    z = EFFECTS["hysteresis"].memory(np.array([0.0, far, 0.0]), 0.0, **HYSTERESIS)[0]
-    assert np.all((np.abs(z) <= 1.0) | np.isnan(z))
 
 
 def test_forces_have_the_sizes_of_their_equations():

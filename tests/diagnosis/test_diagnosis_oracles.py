@@ -92,6 +92,8 @@ EVERY_EFFECT = (
     EffectSpec("coulomb_friction", "mount", 400.0, {"speed": 0.3}),
     EffectSpec("hysteresis", "foam", 1500.0, {"yield_crush": 0.01, "exponent": 2.0}),
     EffectSpec("hysteresis", "foam", 1500.0, {"yield_crush": 0.01, "exponent": 1.5}, variant="dahl"),
+    EffectSpec("maxwell_element", "foam", 2.0e4, {"relaxation_time": 0.01}),
+    EffectSpec("gas_cushion", "foam", 900.0, {"length": 0.2, "leak": 30.0}),
     EffectSpec("rate_hardening", "foam", 40.0, {"exponent": 2.0}),
     EffectSpec("cubic_stiffness", "foam", 2.0e6),
     EffectSpec("clearance", "foam", 0.02),

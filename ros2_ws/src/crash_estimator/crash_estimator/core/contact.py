@@ -95,19 +95,19 @@ class Contact:
         state = np.where(apart, ElementState.APART, np.where(unloads, ElementState.UNLOADING, ElementState.LOADING))
         state = state.astype(np.uint8)
         pressed = np.where(self.compression_only, np.maximum(crush, 0.0), crush)
-        memory = self._remembered(before, pressed)
+        memory = self._remembered(before, pressed, motion.dt)
         law = SpringLaw(
             np.where(apart, 0.0, lever), np.where(apart, 0.0, shift), ~apart, ~apart | self.lasting & ~off,
             on_line & ~apart, peak, memory,
         )  # fmt: skip
         return ContactState(peak, peak_rate, state, pressed, memory), law, self._events(before.state, state, crush)
 
-    def _remembered(self, before: ContactState, crush: np.ndarray) -> np.ndarray:
-        memory = before.memory.copy()
+    def _remembered(self, before: ContactState, crush: np.ndarray, dt: float) -> np.ndarray:
+        step, memory = np.array([0.0, dt]), before.memory.copy()
         for j, action in enumerate(self.actions):
             if action.kind == "memory":
                 way = np.array([before.crush[action.at], crush[action.at]])
-                memory[j] = action.force(way, before.memory[j])[0][-1]
+                memory[j] = action.force(step, way, before.memory[j])[0][-1]
         return memory
 
     def _events(self, before: np.ndarray, after: np.ndarray, crush: np.ndarray) -> tuple[Event, ...]:

@@ -101,6 +101,7 @@ def free_run(
 class _State(NamedTuple):
     """At the end of a step."""
 
+    time: float  # s
     x: np.ndarray  # (b,) m
     v: np.ndarray  # (b,) m/s
     peak: np.ndarray  # (e,) m, largest crush so far
@@ -148,29 +149,29 @@ class _System:
 
     def start(self, t: float, x: np.ndarray, v: np.ndarray) -> _State:
         nothing = np.zeros(len(self.laws))
-        return self.ended(t, x, v, _State(x, v, nothing, nothing, np.zeros(len(self.c))))
+        return self.ended(t, x, v, _State(t, x, v, nothing, nothing, np.zeros(len(self.c))))
 
     def ended(self, t: float, x: np.ndarray, v: np.ndarray, before: _State) -> _State:
         """The state at the end of a step: the largest crush and the memories follow there."""
         crush = self.motion(t, x, v)[0]
-        memory = self.remembered(before, crush)
-        return _State(x, v, np.maximum(before.peak, crush), self.pressed(crush), memory)
+        memory = self.remembered(before, t, crush)
+        return _State(t, x, v, np.maximum(before.peak, crush), self.pressed(crush), memory)
 
     def pressed(self, crush: np.ndarray) -> np.ndarray:
         return np.where(self.pressed_only, np.maximum(crush, 0.0), crush)
 
-    def remembered(self, before: _State, crush: np.ndarray) -> np.ndarray:
+    def remembered(self, before: _State, t: float, crush: np.ndarray) -> np.ndarray:
         """(n,) what the actions remember at a crush within the step, or at its end."""
-        memory = before.memory.copy()
+        step, memory = np.array([0.0, t - before.time]), before.memory.copy()
         for j, action in self.remembering:
             way = np.array([before.crush[action.at], self.pressed(crush)[action.at]])
-            memory[j] = action.force(way, before.memory[j])[0][-1]
+            memory[j] = action.force(step, way, before.memory[j])[0][-1]
         return memory
 
     def forces(self, t: float, state: _State) -> np.ndarray:
         """(e,) N; x and v of the state may be within a step, the rest is of its beginning."""
         crush, rate = self.motion(t, state.x, state.v)
-        memory = self.remembered(state, crush)
+        memory = self.remembered(state, t, crush)
         peak = np.maximum(state.peak, crush)
         force = np.array([
             self.force(k, law, ElementMotion(t, c, r, p, 0.0), memory)

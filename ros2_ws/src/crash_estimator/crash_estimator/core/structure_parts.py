@@ -127,7 +127,7 @@ class EffectSpec:
 class Action:
     """An effect that no element or body has a place for; `core.effects.applied` makes them, `core.actions` acts.
 
-    force gives, by kind: element, N of an ElementMotion (g,); memory, what `HystereticForce` says; factor, h of the
+    force gives, by kind: element, N of an ElementMotion (g,); memory, what `RememberingForce` says; factor, h of the
     rate (g,); body, N of the time (g,) s.
     """
 

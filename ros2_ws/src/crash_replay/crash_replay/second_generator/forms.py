@@ -114,6 +114,8 @@ FORMS: dict[str, Form] = {
     "rate.cowper": Form("rate_hardening", CONTACTS, sizes.changed(sizes.cowper)),
     "rate.power": Form("rate_hardening", CONTACTS, sizes.changed(sizes.power)),
     "rate.log": Form("rate_hardening", CONTACTS, sizes.changed(sizes.log)),
+    "flow.maxwell": Form("maxwell_element", ELEMENTS, sizes.beside(sizes.maxwell)),
+    "flow.gas": Form("gas_cushion", CONTACTS, sizes.beside(sizes.gas), straight=True),
     "hysteresis.boucwen": Form(
         "hysteresis",
         ELEMENTS,
@@ -143,8 +145,8 @@ FORMS: dict[str, Form] = {
     "channel.lowpass": Form("channel_delay", BODIES, sizes.as_it_is),
     "outside.losing": Form("losing_mass", BODIES, sizes.losing, outside=True),
     "outside.folding": Form("folding", CONTACTS, sizes.folding, straight=True, outside=True),
-    "outside.maxwell": Form("maxwell", ELEMENTS, sizes.beside(sizes.maxwell), outside=True),
-    "outside.gas": Form("vented_gas", CONTACTS, sizes.beside(sizes.gas), straight=True, outside=True),
+    "outside.metered": Form("metered", CONTACTS, sizes.beside(sizes.metered), outside=True),
+    "outside.sloshing": Form("sloshing", BODIES, sizes.sloshing, outside=True),
     "outside.breaking": Form("breaking", ELEMENTS, sizes.beside(sizes.breaking), straight=True, outside=True),
     "outside.rattling": Form("rattling", BODIES, sizes.rattling, outside=True),
 }

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import branches, rates, strange
+from . import branches, flowing, rates, strange
 from .curves import Cubic, Curve, Folding, Progressive, Stop, Straight, Sum
 from .joint import Joint
 from .machine import Body
@@ -97,6 +97,16 @@ def line(base: Base) -> dict:
     return {"unload": base.peak.f / base.peak.x * base.share(2.5, 7.0)}
 
 
+def maxwell(base: Base) -> branches.Branch:
+    c = base.share(0.25, 0.4) * base.peak.f / base.peak.v
+    return flowing.Maxwell(c / (base.share(0.1, 0.25) * base.setup.until), c)
+
+
+def gas(base: Base) -> branches.Branch:
+    length = base.share(1.2, 1.5) * base.peak.x
+    return flowing.VentedGas(base.share(0.15, 0.25) * base.peak.f, length, base.share(2.0, 5.0) / base.setup.until)
+
+
 # --- bodies
 
 
@@ -171,16 +181,6 @@ def folding(base: Base) -> Setup:
     return base.setup.with_joint(base.target, replace(base.joint, curve=curve))
 
 
-def maxwell(base: Base) -> branches.Branch:
-    c = base.share(0.25, 0.4) * base.peak.f / base.peak.v
-    return strange.Maxwell(c / (base.share(0.1, 0.25) * base.setup.until), c)
-
-
-def gas(base: Base) -> branches.Branch:
-    length = base.share(1.2, 1.5) * base.peak.x
-    return strange.VentedGas(base.share(0.15, 0.25) * base.peak.f, length, base.share(2.0, 5.0) / base.setup.until)
-
-
 def breaking(base: Base) -> branches.Branch:
     at = base.share(0.4, 0.7) * base.peak.x
     return strange.Fracture(base.share(0.2, 0.4) * base.peak.f / at, at)
@@ -195,6 +195,19 @@ def rattling(base: Base) -> Setup:
     return joined(
         setup, Body("loose", loose, body.v), Joint(body.name, "loose", Straight(0.0), False, branches=(branch,))
     )
+
+
+def metered(base: Base) -> branches.Branch:
+    return strange.MeteringPin(base.share(0.4, 0.8) * base.peak.f / (base.peak.x * base.peak.v))
+
+
+def sloshing(base: Base) -> Setup:
+    """A sixth of the body's mass swings in it at 15 to 30 Hz, and no sensor knows of it: a tank, an occupant."""
+    body = base.setup.body(base.target)
+    loose, w = base.share(0.12, 0.22) * body.mass, base.share(95.0, 190.0)
+    setup = replace(base.setup.with_body(base.target, mass=body.mass - loose), masses={body.name: body.mass})
+    hung = Joint(body.name, "loose", Straight(loose * w * w), one_way=False)
+    return joined(setup, Body("loose", loose, body.v), hung.with_branch(branches.Dashpot(0.2 * loose * w)))
 
 
 def as_it_is(base: Base) -> Setup:

@@ -18,10 +18,10 @@ Law = Callable[[float, float, float], float]
 
 @dataclass(frozen=True)
 class Slip:
-    """A force beside the spring with a memory s of its own, force times s, that follows ds/dt = flow(s, V)."""
+    """A force beside the spring with a memory s of its own, force times s, that follows ds/dt = flow(s, X, V)."""
 
-    force: float  # N, at which it yields
-    flow: Callable[[float, float], float]  # (s from -1 to 1, rate m/s) -> 1/s
+    force: float  # N, at which it yields; N/m where s is a crush
+    flow: Callable[[float, float, float], float]  # (s, crush m, rate m/s) -> ds/dt
     both_ways: bool = True  # False: it lets go where the element is apart, and stays as it was
 
 

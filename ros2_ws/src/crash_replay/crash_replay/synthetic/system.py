@@ -58,7 +58,7 @@ class Element:
     slip: Slip | None = None
 
     def force(self, crush: float, rate: float, peak: float, slipped: float = 0.0) -> float:
-        """N, compression positive; slipped: what the slip remembers, from -1 to 1."""
+        """N, compression positive; slipped: what the slip remembers."""
         force = self.spring(crush, rate, peak) + self.damping * rate
         for law in self.others:
             force += law(crush, rate, peak)
@@ -67,10 +67,10 @@ class Element:
         return force
 
     def slips(self, crush: float, rate: float, slipped: float) -> float:
-        """1/s, at which what the slip remembers changes; nothing while the element is apart."""
+        """ds/dt, at which what the slip remembers changes; nothing while the element is apart."""
         if self.slip is None or not (self.slip.both_ways or crush > 0.0):
             return 0.0
-        return self.slip.flow(slipped, rate)
+        return self.slip.flow(slipped, crush, rate)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """What a file with a user's own effects imports: the kinds of effects, and what their functions are given.
 
-`HystereticForce` is not among them: what a user's function gives is looked at before it is believed (`user.py`), and of
-a memory with its derivatives that is not done yet.
+`RememberingForce` is not among them: what a user's function gives is looked at before it is believed (`user.py`), and
+of a memory with its derivatives that is not done yet.
 """
 
 from .effect import Addition, Effect, ElementMotion, Shape

@@ -13,18 +13,20 @@ motion turns.
 import numpy as np
 
 from .effect import Shape
-from .kinds import HystereticForce
+from .kinds import RememberingForce
 
 
-def memory(crush: np.ndarray, start: float, yield_crush: float, exponent: float, form: str = ""):
-    """z (g,) from `start` at the first of the crushes (g,) m, and its derivatives by the z before and by the crush."""
+def memory(step: np.ndarray, crush: np.ndarray, start: float, yield_crush: float, exponent: float, form: str = ""):
+    """z (g,) from `start` at the first of the crushes (g,) m, and how it follows: see `RememberingForce`."""
     back = 1.0 if form == "dahl" else 0.0
     from .bouc_wen import trace  # the compiler takes long to import: only who needs it waits for it
 
-    return trace(np.ascontiguousarray(crush, dtype=float), float(start), float(yield_crush), float(exponent), back)
+    crush = np.ascontiguousarray(crush, dtype=float)
+    z, kept, by_crush = trace(crush, float(start), float(yield_crush), float(exponent), back)
+    return z, kept, by_crush, by_crush
 
 
-EFFECT = HystereticForce(
+EFFECT = RememberingForce(
     "hysteresis",
     "N",
     {

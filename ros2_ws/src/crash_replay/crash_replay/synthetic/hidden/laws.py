@@ -8,7 +8,7 @@ is one. An element is apart where it carries no tension and its static force has
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import tanh
+from math import sqrt, tanh
 from typing import Any
 
 from ..curves import Curve
@@ -66,16 +66,39 @@ class Carrier:
         return force
 
 
-def bouc_wen(crush: float, sharpness: float) -> Callable[[float, float], float]:
+Flow = Callable[[float, float, float], float]
+"""Of what a slip remembers: s, crush m, rate m/s -> ds/dt."""
+
+
+def bouc_wen(crush: float, sharpness: float) -> Flow:
     """ds/dt = V (1 - |s|^n) / X_y while it yields further, V / X_y on the way back (Wen 1976, A = 1, beta = gamma)."""
-    return lambda s, rate: rate / crush * (1.0 - abs(s) ** sharpness if s * rate > 0.0 else 1.0)
+    return lambda s, _, rate: rate / crush * (1.0 - abs(s) ** sharpness if s * rate > 0.0 else 1.0)
 
 
-def two_sliders(crush: float, share: float) -> Callable[[float, float], float]:
+def two_sliders(crush: float, share: float) -> Flow:
     """Two dry sliders behind springs, one that gives way early (Iwan 1966), as one curve of three straight parts:
     up to `share` of the force the spring of both, then that of the second alone."""
     early, late = 2.0 / crush, 2.0 * (1.0 - share) / (crush * (2.0 - share))
-    return lambda s, rate: rate * (early if s * rate <= 0.0 or abs(s) < share else late if abs(s) < 1.0 else 0.0)
+    return lambda s, _, rate: rate * (early if s * rate <= 0.0 or abs(s) < share else late if abs(s) < 1.0 else 0.0)
+
+
+def maxwell(relaxes: float) -> Flow:
+    """ds/dt = V - s / T: the crush of a spring whose other end a damper lets go (Maxwell 1867)."""
+    return lambda s, _, rate: rate - s / relaxes
+
+
+def vented_gas(length: float, leak: float) -> Flow:
+    """ds/dt = 1.4 (1 + s) (V / (L - X) - w sqrt(s) / m) of the overpressure s, with m = (1 - X / L) (1 + s)^(5/7) of
+    the gas left; what a step takes too much of it is let in again."""
+
+    def flow(s: float, crush: float, rate: float) -> float:
+        room = 1.0 - max(crush, 0.0) / length
+        pressed = rate / (length * room) if crush > 0.0 else 0.0
+        if s <= 0.0:
+            return max(1.4 * pressed, 0.0) - 1000.0 * s
+        return 1.4 * (1.0 + s) * (pressed - leak * sqrt(s) / (room * (1.0 + s) ** (5.0 / 7.0)))
+
+    return flow
 
 
 def quadratic_damping(c: float) -> Parallel:

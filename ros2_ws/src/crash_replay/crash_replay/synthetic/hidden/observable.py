@@ -50,8 +50,8 @@ PUSH = 0.001
 """Of an element's peak force: as little as the integration resolves, for the answer is not linear for long."""
 
 ON_ELEMENTS = (
-    "viscous_damping", "quadratic_damping", "coulomb_friction", "hysteresis", "rate_hardening", "cubic_stiffness",
-    "bottoming_out", "clearance", "plastic_unloading",
+    "viscous_damping", "quadratic_damping", "coulomb_friction", "hysteresis", "maxwell_element", "gas_cushion",
+    "rate_hardening", "cubic_stiffness", "bottoming_out", "clearance", "plastic_unloading",
 )  # fmt: skip
 
 SHOWS_OUTSIDE = 3.0 * SHOWS
@@ -94,9 +94,9 @@ def targets(specimen: Specimen, peaks: Peaks, effect: str) -> list[str]:
     carrying = [e for e in peaks.force if peaks.force[e] >= CARRIES * strongest and peaks.travel[e] >= MOVES]
     pressed = [e for e in carrying if peaks.crush[e] >= MOVES]
     match effect:
-        case "viscous_damping" | "quadratic_damping" | "coulomb_friction" | "hysteresis":
+        case "viscous_damping" | "quadratic_damping" | "coulomb_friction" | "hysteresis" | "maxwell_element":
             return carrying
-        case "rate_hardening":
+        case "rate_hardening" | "gas_cushion":
             return pressed
         case "plastic_unloading":
             return [e for e in pressed if peaks.drop[e] >= UNLOADS]

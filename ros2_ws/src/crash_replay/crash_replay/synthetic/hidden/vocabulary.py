@@ -1,4 +1,4 @@
-"""The sixteen effects of the vocabulary, hidden in a specimen.
+"""The effects of the vocabulary, hidden in a specimen.
 
 A function gets the specimen, its peaks without the effect, the target, a share and a stream of random numbers,
 and gives the specimen with the effect and what was hidden. The share is the effect's size: about what it
@@ -70,6 +70,27 @@ def hysteresis(specimen, peaks, target, share, rng):
     slip = Slip(c, flow, both_ways=specimen.element(target).spring.tension)
     elements = [replace(e, slip=slip) if e.name == target else e for e in specimen.scenario.system.elements]
     return specimen.with_parts(elements=elements), Hidden("hysteresis", target, c, "N", shape)
+
+
+def maxwell_element(specimen, peaks, target, share, rng):
+    """A spring behind a damper, which relaxes within a tenth to a half of the time that the crush takes."""
+    relaxes = float(rng.uniform(0.1, 0.5)) * max(peaks.crush[target], 0.3 * peaks.travel[target]) / peaks.rate[target]
+    c = 1.4 * share * peaks.force[target] / (peaks.rate[target] * relaxes)
+    slip = Slip(c, laws.maxwell(relaxes), both_ways=specimen.element(target).spring.tension)
+    elements = [replace(e, slip=slip) if e.name == target else e for e in specimen.scenario.system.elements]
+    hidden = Hidden("maxwell_element", target, c, "N/m", {"relaxation_time": relaxes})
+    return specimen.with_parts(elements=elements), hidden
+
+
+def gas_cushion(specimen, peaks, target, share, rng):
+    """As long as 1.3 to 2 of the largest crush; a share of its gas that matters leaves while it is pressed."""
+    pressed = max(peaks.crush[target], 0.3 * peaks.travel[target])
+    length, leak = float(rng.uniform(1.3, 2.0)) * pressed, float(rng.uniform(0.2, 0.8)) * peaks.rate[target] / pressed
+    c = share * peaks.force[target] * length / pressed
+    slip = Slip(c, laws.vented_gas(length, leak), both_ways=specimen.element(target).spring.tension)
+    elements = [replace(e, slip=slip) if e.name == target else e for e in specimen.scenario.system.elements]
+    hidden = Hidden("gas_cushion", target, c, "N", {"length": length, "leak": leak})
+    return specimen.with_parts(elements=elements), hidden
 
 
 def rate_hardening(specimen, peaks, target, share, rng):
@@ -170,10 +191,9 @@ def channel_offset(specimen, peaks, target, share, rng):
 VOCABULARY: Mapping[str, Hide] = {
     hide.__name__: hide
     for hide in (
-        viscous_damping, quadratic_damping, coulomb_friction, hysteresis, rate_hardening, cubic_stiffness, clearance,
-        bottoming_out,
-        plastic_unloading, load_path, added_mass, unmodelled_body, constant_force, channel_delay, channel_gain,
-        channel_offset,
+        viscous_damping, quadratic_damping, coulomb_friction, hysteresis, maxwell_element, gas_cushion,
+        rate_hardening, cubic_stiffness, clearance, bottoming_out, plastic_unloading, load_path, added_mass,
+        unmodelled_body, constant_force, channel_delay, channel_gain, channel_offset,
     )
 }  # fmt: skip
 

@@ -28,9 +28,10 @@ class Linear(NamedTuple):
     column: np.ndarray  # (m,) of them, in which something acts ...
     body: np.ndarray  # (m,) ... on this body:
     acts: np.ndarray  # (m, g) an external acceleration (free, driven) or force (fixed)
-    remembers: np.ndarray  # (m,) the link of each memory z, which follows kept z + by_crush (X - the X before)
+    remembers: np.ndarray  # (m,) the link of each memory, kept z + by_crush X - by_before (the X before)
     kept: np.ndarray  # (m, g)
     by_crush: np.ndarray  # (m, g) 1/m
+    by_before: np.ndarray  # (m, g) 1/m
     recalled: np.ndarray  # (m, g) N, dF/dz; dF/dX by z itself is in kx
     touched: np.ndarray  # (g,) columns of knots, in the order of their first use, that are in use so far: see `ranked`
 

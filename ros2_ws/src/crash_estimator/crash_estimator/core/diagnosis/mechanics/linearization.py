@@ -176,6 +176,7 @@ def _linear_system(
         remembers=np.array([k for k, f in enumerate(forces) for _ in f.memories], np.int64),
         kept=_stacked([m.kept for m in memories], g),
         by_crush=_stacked([m.by_crush for m in memories], g),
+        by_before=_stacked([m.by_before for m in memories], g),
         recalled=_stacked([m.force for m in memories], g),
         touched=touched,
     ), order

@@ -9,7 +9,7 @@ carried, so that a force that jumps at contact gives the right momentum whatever
 that is spent (`acts_when_spent`) it is 1 as long as there is crush. A link without tension whose
 damper never pulls carries nothing where F is negative though S is not. What z remembers follows
 
-    dz_t = a_t dz_{t-1} + b_t (dX_t - dX_{t-1}),
+    dz_t = a_t dz_{t-1} + b_t dX_t - b'_t dX_{t-1},
 """
 
 from functools import partial
@@ -37,7 +37,8 @@ class Memory(NamedTuple):
     """How one remembering force follows a change of the motion, over g instants."""
 
     kept: np.ndarray  # (g,) dz_t/dz_{t-1}
-    by_crush: np.ndarray  # (g,) dz_t/dX_t = - dz_t/dX_{t-1}, 1/m
+    by_crush: np.ndarray  # (g,) dz_t/dX_t, 1/m
+    by_before: np.ndarray  # (g,) - dz_t/dX_{t-1}, 1/m
     force: np.ndarray  # (g,) N, dF_t/dz_t
 
 
@@ -135,7 +136,7 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
             columns += [beside.gate * c * d for d in by_shape]
         for term in link.remembering:
             beside = crushed if link.outlasts(term.addition.effect) else contact
-            memories.append(_remembered(term, link, theta, x, beside, parameters, columns))
+            memories.append(_remembered(term, link, theta, time, x, beside, parameters, columns))
         for beside in (contact, crushed) if crushed is not contact else (contact,):
             force = force + beside.gate * beside.force
             kx, kv = kx + beside.gate * beside.px + beside.slope * beside.force, kv + beside.gate * beside.pv
@@ -186,19 +187,21 @@ def _inside(term: Term, theta: np.ndarray, at: np.ndarray) -> _Inside:
     return _Inside(c * f, c * slope, parameters, [f, *(c * each for each in by_shape)])
 
 
-def _remembered(term: Term, link: Link, theta, x, beside: _Beside, parameters, columns) -> Memory:
+def _remembered(term: Term, link: Link, theta, time, x, beside: _Beside, parameters, columns) -> Memory:
     """c z is added to the forces beside the spring, derivatives are appended -> its memory."""
     c, shapes = theta[term.coefficient], term.shapes_at(theta)
-    memory = partial(term.addition.effect.memory, form=term.addition.variant)
+    step = np.concatenate([[0.0], np.diff(time, prepend=time[0])])
+    memory = partial(term.addition.effect.memory, step, form=term.addition.variant)
     crush = np.concatenate([[0.0], x if link.tension else np.maximum(x, 0.0)])
-    z, kept, by_crush = (each[1:] for each in memory(crush, 0.0, **shapes))
+    z, kept, by_crush, by_before = (each[1:] for each in memory(crush, 0.0, **shapes))
     parameters += [term.coefficient, *term.shapes.values()]
     gate = beside.gate
     columns += [gate * z]
     columns += [gate * c * d for d in term.by_shapes(theta, lambda **s: memory(crush, 0.0, **s)[0][1:])]
-    follows = by_crush if link.tension else np.where(x > 0.0, by_crush, 0.0)
-    beside.add(c * z, c * follows, 0.0)
-    return Memory(kept, follows, gate * c)
+    if not link.tension:
+        by_crush, by_before = by_crush * (x > 0.0), by_before * (crush[:-1] > 0.0)
+    beside.add(c * z, c * by_crush, 0.0)
+    return Memory(kept, by_crush, by_before, gate * c)
 
 
 def _slopes(term: Term, theta: np.ndarray, motion: ElementMotion):

@@ -33,7 +33,8 @@ def _whole(columns):
 def propagate(system, sampling, out):
     """Fill out (bins, q, columns); system: a `linear.Linear`, sampling: a `linear.Sampling`."""
     steps, ends, crush_ends, inverse_mass, kind, kx, kv, kp, loading, knot, weight = system[:11]
-    changed, observer, others, column, body, acts, remembers, kept, by_crush, recalled, touched = system[11:]
+    changed, observer, others, column, body, acts, remembers, kept, by_crush, by_before, recalled = system[11:22]
+    touched = system[22]
     b, links, columns = len(kind), len(ends), _whole(others + touched[-1])
     x, v, a = np.zeros((b, columns)), np.zeros((b, columns)), np.zeros((b, columns))
     peak, row = np.zeros((links, columns)), np.zeros((b, columns))
@@ -57,7 +58,7 @@ def propagate(system, sampling, out):
                 memory[m, j] *= kept[m, t]
             if near >= 0:
                 for j in range(active):
-                    memory[m, j] -= by_crush[m, t] * (x[near, j] - x[far, j])
+                    memory[m, j] -= by_before[m, t] * (x[near, j] - x[far, j])
         for k in range(b):
             for j in range(active):
                 row[k, j] = 0.0
@@ -164,7 +165,7 @@ def respond(system, change):
     One column needs no loops over columns, and so a fourth of the time.
     """
     steps, ends, crush_ends, inverse_mass, kind, kx, kv, kp, loading, knot, weight = system[:11]
-    changed, observer, others, column, body, acts, remembers, kept, by_crush, recalled = system[11:21]
+    changed, observer, others, column, body, acts, remembers, kept, by_crush, by_before, recalled = system[11:22]
     b, links = len(kind), len(ends)
     x, v, a, row, peak = np.zeros(b), np.zeros(b), np.zeros(b), np.zeros(b), np.zeros(links)
     memory = np.zeros(len(remembers))
@@ -186,7 +187,7 @@ def respond(system, change):
         half, sixth = dt / 2.0, dt * dt / 6.0
         for m in range(len(remembers)):
             near, far = crush_ends[remembers[m], 0], crush_ends[remembers[m], 1]
-            memory[m] = kept[m, t] * memory[m] - (by_crush[m, t] * (x[near] - x[far]) if near >= 0 else 0.0)
+            memory[m] = kept[m, t] * memory[m] - (by_before[m, t] * (x[near] - x[far]) if near >= 0 else 0.0)
         for k in range(b):
             row[k] = rows[t, k]
             if kind[k] == DRIVEN:

@@ -6,12 +6,12 @@ from .body_inertia import BodyInertia
 from .channel_error import ChannelError
 from .element_force import ElementForce
 from .gap import Gap
-from .hysteretic_force import HystereticForce
 from .pair_spring import PairSpring
+from .remembering_force import RememberingForce
 from .static_factor import StaticFactor
 from .unloading_slope import UnloadingSlope
 
 __all__ = [
-    "AttachedBody", "BodyForce", "BodyInertia", "ChannelError", "ElementForce", "Gap", "HystereticForce", "PairSpring",
+    "AttachedBody", "BodyForce", "BodyInertia", "ChannelError", "ElementForce", "Gap", "RememberingForce", "PairSpring",
     "StaticFactor", "UnloadingSlope",
 ]  # fmt: skip

@@ -1,0 +1,36 @@
+"""A cushion of gas with a hole (airbag, bladder, tyre): F = c y, with y the overpressure over that of the air outside.
+
+    y = (m / (1 - X / L))^1.4 - 1 >= 0,      dm/dt = - w sqrt(y),      m = 1 at first contact
+
+X is the crush in m, compression positive; c in N, never negative, is the pressure outside times the cushion's area; its
+length L in m, which no crush reaches, and w in 1/s, at which its gas would leave at twice the pressure outside, are
+found. m is the share of the gas that is left; as the cushion opens, what is missing flows in freely. The gas is
+compressed without heat, and leaves as water would (Bernoulli, which holds below a third of the speed of sound). It is a
+nonlinear spring where w is small, a damper of the square of the rate where it is large.
+"""
+
+import numpy as np
+
+from .effect import Shape
+from .kinds import RememberingForce
+
+
+def memory(step: np.ndarray, crush: np.ndarray, start: float, length: float, leak: float, form: str = ""):
+    """y (g,) from `start` at the first of the crushes (g,) m, and how it follows: see `RememberingForce`."""
+    from .vented_gas import trace  # the compiler takes long to import: only who needs it waits for it
+
+    step, crush = (np.ascontiguousarray(each, dtype=float) for each in (step, crush))
+    return trace(step, crush, float(start), float(length), float(leak))
+
+
+EFFECT = RememberingForce(
+    "gas_cushion",
+    "N",
+    {
+        "length": Shape("m", 1.05, 5.0, (1.3, 2.5), of_crush=True),
+        "leak": Shape("1/s", 1.0, 300.0, (5.0, 50.0)),
+    },
+    memory=memory,
+    bounded=False,
+)
+"""Limits of the leak: what does not leave within a crash, and what has left within some ms."""

@@ -1,0 +1,36 @@
+"""A spring in series with a damper (Maxwell 1867): a force that the rate of crush builds up, and that relaxes.
+
+    dF/dt = k V - F / T,      F = 0 at first contact;      F = k z,  dz/dt = V - z / T
+
+V is the rate of crush in m/s, compression positive; k in N/m, never negative, is the coefficient; the relaxation time
+T in s, the damper's constant divided by k, is found. Rubber mounts, foams and soft tissue do so, and a hydraulic damper
+on a mount that gives way. `viscous_damping` is its limit for a small T, a spring in parallel that for a large one.
+
+The crush is a straight line within a step of h: z_t = a z_{t-1} + (1 - a) T / h (X_t - X_{t-1}),  a = exp(-h / T).
+"""
+
+import numpy as np
+
+from .effect import Shape
+from .kinds import RememberingForce
+
+
+def memory(step: np.ndarray, crush: np.ndarray, start: float, relaxation_time: float, form: str = ""):
+    """z (g,) m from `start` at the first crush (g,) m on, and how it follows: see `RememberingForce`."""
+    from .relaxation import trace  # the compiler takes long to import: only who needs it waits for it
+
+    turns = np.asarray(step, dtype=float) / relaxation_time
+    kept = np.exp(-turns)
+    by_crush = np.divide(-np.expm1(-turns), turns, out=np.ones_like(turns), where=turns > 0.0)
+    return trace(np.ascontiguousarray(crush, dtype=float), float(start), kept, by_crush), kept, by_crush, by_crush
+
+
+EFFECT = RememberingForce(
+    "maxwell_element",
+    "N/m",
+    {"relaxation_time": Shape("s", 1e-3, 0.1, (3e-3, 0.02))},
+    memory=memory,
+    bounded=False,
+)
+"""Its limits: a quarter period of CFC 180's 300 Hz, below which it is a damper, and as long as a crash takes, above
+which it is a spring; the starts divide them evenly by their logarithm."""
