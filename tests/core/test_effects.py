@@ -75,6 +75,17 @@ def test_the_rate_of_cowper_and_symonds_doubles_the_force():
     assert_allclose(hardening.factor(np.array([-5.0, 0.0]), exponent=5.0), 0.0)
 
 
+def test_the_logarithmic_rate_doubles_the_force_too_and_counts_from_its_reference_on():
+    hardening = EFFECTS["rate_hardening"]
+    c = hardening.unstated(40.0, reference_rate=0.5)
+    rates = np.array([-5.0, 0.0, 0.3, 0.5, 40.0, 3200.0])
+    assert_allclose(1.0 + c * hardening.factor(rates, reference_rate=0.5), [1.0, 1.0, 1.0, 1.0, 2.0, 3.0])
+    assert hardening.stated(c, reference_rate=0.5) == pytest.approx(40.0)
+    assert hardening.stated(1e-9, reference_rate=0.5) == np.inf == hardening.stated(0.0, reference_rate=0.5)
+    with pytest.raises(ModelError, match="40 m/s, the rate that doubles the force, must be above .* 40 m/s, at which"):
+        hardening.unstated(40.0, reference_rate=40.0)
+
+
 def test_the_limits_are_physical():
     """Damping and stiffness never negative; a delay within 1 ms, a gain within 10 %, an offset within 5 g."""
     signed = {"constant_force", "channel_gain", "channel_offset"}

@@ -95,6 +95,7 @@ EVERY_EFFECT = (
     EffectSpec("maxwell_element", "foam", 2.0e4, {"relaxation_time": 0.01}),
     EffectSpec("gas_cushion", "foam", 900.0, {"length": 0.2, "leak": 30.0}),
     EffectSpec("rate_hardening", "foam", 40.0, {"exponent": 2.0}),
+    EffectSpec("rate_hardening", "foam", 40.0, {"reference_rate": 0.5}, variant="logarithmic"),
     EffectSpec("cubic_stiffness", "foam", 2.0e6),
     EffectSpec("clearance", "foam", 0.02),
     EffectSpec("clearance", "mount", 0.005, variant="play"),

@@ -1,31 +1,50 @@
-"""Rate hardening (Cowper-Symonds): the static force times 1 + (V / D)^(1/q) while V > 0.
+"""Rate hardening: the static force times 1 + c h(V) while V > 0; V is the rate of crush in m/s.
 
-V is the rate of crush in m/s; D, the rate that doubles the force, in m/s, is the coefficient; the exponent q is
-found. The fit works with c = D^(-1/q), in which the force is linear: c = 0 is no hardening, D infinite.
+    h = V^(1/q)             Cowper and Symonds 1957; the exponent q is found
+    h = ln(V / V0) >= 0     form `logarithmic`, Johnson and Cook 1983; the reference rate V0 in m/s is found
+
+The coefficient is D, the rate in m/s that doubles the force: 1 + (V / D)^(1/q), or 1 + ln(V / V0) / ln(D / V0). The
+fit works with c, in which the force is linear: c = 0 is no hardening, D infinite.
 """
 
 import numpy as np
 
+from ..structure import ModelError
 from .base import Shape, StaticFactor
 
 
-def factor(rate: np.ndarray, exponent: float) -> np.ndarray:
+def factor(rate: np.ndarray, exponent: float | None = None, reference_rate: float | None = None) -> np.ndarray:
+    if reference_rate is not None:
+        return np.log(np.maximum(rate / reference_rate, 1.0))
     return np.maximum(rate, 1e-9) ** (1.0 / exponent) * (rate > 0.0)
 
 
-def stated(c: float, exponent: float) -> float:
-    return c**-exponent if c > 0.0 else np.inf
+def stated(c: float, exponent: float | None = None, reference_rate: float | None = None) -> float:
+    if c <= 0.0:
+        return np.inf
+    if reference_rate is not None:
+        with np.errstate(over="ignore"):
+            return float(reference_rate * np.exp(1.0 / c))
+    return c**-exponent
 
 
-def unstated(value: float, exponent: float) -> float:
-    return value ** (-1.0 / exponent)
+def unstated(value: float, exponent: float | None = None, reference_rate: float | None = None) -> float:
+    if reference_rate is None:
+        return value ** (-1.0 / exponent)
+    if value <= reference_rate:
+        raise ModelError(
+            f"rate_hardening: {value:g} m/s, the rate that doubles the force, must be above the reference rate, "
+            f"{reference_rate:g} m/s, at which it begins to grow"
+        )
+    return float(1.0 / np.log(value / reference_rate))
 
 
 EFFECT = StaticFactor(
     "rate_hardening",
     "m/s",
-    {"exponent": Shape("", 0.7, 10.0, (1.0, 3.0))},
+    {"exponent": Shape("", 0.7, 10.0, (1.0, 3.0)), "reference_rate": Shape("m/s", 1e-3, 10.0, (0.03, 1.0))},
     factor=factor,
     stated=stated,
     unstated=unstated,
+    forms={"": ("exponent",), "logarithmic": ("reference_rate",)},
 )

@@ -114,7 +114,9 @@ def _try_out(where: str, effect: Effect) -> None:
     crush = LARGEST_CRUSH * np.sin(40.0 * time)
     peak, rate = np.maximum.accumulate(crush), np.gradient(crush, time)
     motion = ElementMotion(time, crush, rate, peak, 1e5 * np.maximum(crush, 0.0))
-    shapes = {n: s.starts[0] * (LARGEST_CRUSH if s.of_crush else 1.0) for n, s in effect.shapes.items()}
+    shapes = {
+        n: s.starts[0] * (LARGEST_CRUSH if s.of_crush else 1.0) for n, s in effect.shapes_of(effect.variants[0]).items()
+    }
     with np.errstate(all="ignore"):
         values = effect.trial(motion, **shapes)
     bad = np.flatnonzero(~(np.abs(values) <= NUMBER.highest))

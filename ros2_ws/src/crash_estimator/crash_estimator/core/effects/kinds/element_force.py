@@ -66,9 +66,9 @@ class ElementForce(Effect):
 
 def on_element(effect: Effect, magnitudes, element: str, variant: str = ""):
     """One addition for each combination of the starts of its shape constants."""
-    names = list(effect.shapes)
-    unit = [magnitudes.shape_unit(effect.shapes[name], element) for name in names]
-    for values in product(*(effect.shapes[name].starts for name in names)):
+    shapes = effect.shapes_of(variant)
+    names, unit = list(shapes), [magnitudes.shape_unit(shape, element) for shape in shapes.values()]
+    for values in product(*(shape.starts for shape in shapes.values())):
         yield Addition(
             effect, element, {n: v * u for n, v, u in zip(names, values, unit, strict=True)}, variant=variant
         )

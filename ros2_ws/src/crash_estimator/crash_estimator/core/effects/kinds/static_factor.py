@@ -1,7 +1,7 @@
 """A factor 1 + c h(V) on an element's static force."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from typing import ClassVar
 
@@ -19,15 +19,25 @@ class StaticFactor(Effect):
 
     factor(rate (g,) m/s, **shape constants) -> (g,) h per unit of c;
     stated(c, **shape constants) -> the coefficient as the literature states it, and `unstated` back.
+
+    Its forms, where it has several, differ by their shape constants.
     """
 
     factor: Callable[..., np.ndarray] | None = None
     stated: Callable[..., float] = lambda c: c
     unstated: Callable[..., float] = lambda value: value
+    forms: Mapping[str, Sequence[str]] = field(default_factory=dict)  # form -> names of its shape constants
 
     function: ClassVar[str] = "factor"
     scales_static: ClassVar[bool] = True
     restated: ClassVar[bool] = True
+
+    @property
+    def variants(self):
+        return tuple(self.forms) or ("",)
+
+    def shapes_of(self, variant):
+        return {name: self.shapes[name] for name in self.forms[variant]} if self.forms else self.shapes
 
     def stated_limits(self):
         return 0.0, np.inf
@@ -48,7 +58,8 @@ class StaticFactor(Effect):
 
     def candidates(self, structure, magnitudes):
         for element in magnitudes.crushed_elements():
-            yield from on_element(self, magnitudes, element.name)
+            for variant in self.variants:
+                yield from on_element(self, magnitudes, element.name, variant)
 
     def prior_std(self, magnitudes, addition):
         rate = magnitudes.rate[[magnitudes.element(addition.target)]]
