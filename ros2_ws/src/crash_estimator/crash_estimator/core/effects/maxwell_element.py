@@ -28,9 +28,9 @@ def memory(step: np.ndarray, crush: np.ndarray, start: float, relaxation_time: f
 EFFECT = RememberingForce(
     "maxwell_element",
     "N/m",
-    {"relaxation_time": Shape("s", 1e-3, 0.1, (3e-3, 0.02))},
+    {"relaxation_time": Shape("s", 3e-3, 0.1, (6e-3, 0.03))},
     memory=memory,
     bounded=False,
 )
-"""Its limits: a quarter period of CFC 180's 300 Hz, below which it is a damper, and as long as a crash takes, above
-which it is a spring; the starts divide them evenly by their logarithm."""
+"""Its limits: at the 50 Hz of a structure's own motion a spring that relaxes in 3 ms gives as much of it as the damper
+does (w T = 1), below it is a damper; as long as a crash takes, and it is a spring."""
