@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -100,7 +101,7 @@ def _timed(told: Callable[[str], None], what: str) -> Iterator[None]:
 
 
 def _estimated(
-    recording: Recording, structure: Structure, method: str, end: float, settings: Mapping[str, float],
+    recording: Recording, structure: Structure, method: str, end: float, settings: Mapping[str, Any],
     effects: Mapping[str, Effect],
 ) -> Result:  # fmt: skip
     estimator = make_estimator(structure, recording.test, method, effects=effects, **settings)

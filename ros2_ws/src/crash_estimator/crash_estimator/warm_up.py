@@ -12,6 +12,7 @@ from crash_replay.said import say
 from crash_replay.starting import begin, held
 from crash_replay.synthetic.recordings import simulate_recording
 
+from .core.compiled.estimator import CompiledEstimator
 from .core.diagnosis import diagnose
 from .core.effects import EFFECTS
 from .core.methods import make_estimator
@@ -25,6 +26,7 @@ def estimate() -> None:
     """All compiled methods are settings of the same functions."""
     recording, _ = simulate_recording(MODEL)
     estimator = make_estimator(load_model(MODEL), recording.test, "mrls")
+    assert isinstance(estimator, CompiledEstimator)
     estimator.follow(estimator.init(), recording.time_ns[:3], recording.values[:3])
 
 

@@ -96,7 +96,7 @@ class Attending:
     def _on_word(self, message: Message) -> None:
         if message.node != self.own.node or message.process != self.own.process or message.host != self.own.host:
             said = (getattr(message, field) for field in Word._fields)
-            self.others.hear(Word(*(visible(one) if isinstance(one, str) else one for one in said)))
+            self.others.hear(Word._make(visible(one) if isinstance(one, str) else one for one in said))
 
     def _on_state(self, message: ReplayState) -> None:
         self.replay_state = message

@@ -145,6 +145,7 @@ class Console:
             self.say(HELP)
         else:
             return f"no such key: {key!r}; h lists them"
+        return None
 
 
 def wanted(value: str, stream: TextIO) -> bool:

@@ -9,7 +9,7 @@ from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
 from hashlib import blake2b
 from pathlib import Path
-from typing import NamedTuple
+from typing import IO, NamedTuple, cast
 
 from mcap.data_stream import RecordBuilder
 from mcap.records import Metadata
@@ -71,7 +71,7 @@ class Recorder:
         """Raises FileExistsError: nothing is overwritten."""
         typestore()  # takes its time, when nothing has to be heard yet
         self.file, self.stream = file, WholeFile(file)
-        self.writer = BagWriter(self.stream, data_crc=False)
+        self.writer = BagWriter(cast(IO[bytes], self.stream), data_crc=False)
         self.stream.flush()
         self.topics: dict[str, int] = {}  # indices in the file, by name
         self.repeats: dict[str, Repeats] = {}  # of latched topics

@@ -187,7 +187,7 @@ def replay_beside(
     """
     prepare_middleware()
     # Ctrl-C must end the replay between two messages, not take the context away under it.
-    rclpy.init(args=arguments and list(arguments), signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=None if arguments is None else list(arguments), signal_handler_options=SignalHandlerOptions.NO)
     try:
         others = make_others()
         node = make()
@@ -197,7 +197,8 @@ def replay_beside(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: setattr(node.pacing, "stopped", True))
     executor, done = EventsExecutor(), Future()
-    for one in (node, *others):
+    nodes: list[Node] = [node, *others]
+    for one in nodes:
         executor.add_node(one)
     services = Thread(target=spin, args=(executor, done))
     services.start()
@@ -214,7 +215,7 @@ def replay_beside(
         executor.wake()
         services.join()
         executor.shutdown()
-        for one in (node, *others):
+        for one in nodes:
             one.destroy_node()
         rclpy.shutdown()
 

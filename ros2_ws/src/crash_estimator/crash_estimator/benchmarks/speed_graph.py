@@ -13,6 +13,7 @@ import numpy as np
 import rclpy
 from crash_msgs.msg import Parameters, ParametersBlock, Residuals, ResidualsBlock, Samples, TestInfo
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
@@ -83,7 +84,7 @@ class Listener(Node):
     def heard(self) -> tuple[int, ...]:
         return tuple(min(count.values()) for count in self.counts.values())
 
-    def publishers(self) -> int:
+    def publishers_found(self) -> int:
         return sum(self.count_publishers(f"/{name}/{topic}") for name in self.counts for topic in self.counts[name])
 
 
@@ -118,7 +119,7 @@ class Graph:
 
     def settle(self) -> None:
         """Until every node that is to speak has its publishers found."""
-        self.spin_until(lambda: self.listener.publishers() >= 2 * len(self.names), "the nodes speak")
+        self.spin_until(lambda: self.listener.publishers_found() >= 2 * len(self.names), "the nodes speak")
         self.spin(0.3)
 
     def spin(self, seconds: float) -> None:
@@ -201,7 +202,7 @@ def latencies(graph: Graph, recording: Recording, rate: float, samples: int) -> 
     return np.array([arrival.get(k, np.inf) - sent[k] for k in range(samples)])
 
 
-def _listen(executor: EventsExecutor, stop: threading.Event) -> None:
+def _listen(executor: Executor, stop: threading.Event) -> None:
     while not stop.is_set():
         executor.spin_once(timeout_sec=0.05)
 

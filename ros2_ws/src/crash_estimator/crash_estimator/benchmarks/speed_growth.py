@@ -7,6 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
+from ..core.compiled.estimator import CompiledEstimator
 from ..core.methods import make_estimator
 from ..model_file import load_model
 from .speed_recordings import chain, ringing
@@ -30,6 +31,7 @@ def _cost(folder: Path, channels: int, bodies: int, method: str) -> float:
     """s a sample in blocks."""
     recording = ringing(channels, 0.05)
     estimator = make_estimator(load_model(str(chain(bodies, folder / "grow.yaml"))), recording.test, method)
+    assert isinstance(estimator, CompiledEstimator)
     whole = lambda: estimator.follow(estimator.init(), recording.time_ns, recording.values)  # noqa: E731
     return per_call(whole, 0.2) / len(recording)
 
@@ -46,6 +48,7 @@ def _length(folder: Path, seconds: Sequence[float]) -> Iterator[Row]:
     model = load_model(str(chain(3, folder / "grow.yaml")))
     block = ringing(4, BLOCK / 10e3)
     estimator = make_estimator(model, block.test, "constrained_kalman")
+    assert isinstance(estimator, CompiledEstimator)
     for length in seconds:
         blocks, state = max(1, round(length * 10e3 / BLOCK)), estimator.init()
         tracemalloc.start()

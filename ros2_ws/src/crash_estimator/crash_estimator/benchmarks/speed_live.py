@@ -9,6 +9,7 @@ import numpy as np
 from crash_replay.bag import read_bag, write_bag
 from crash_replay.same_messages import messages_by_topic
 
+from ..core.compiled.estimator import CompiledEstimator
 from ..core.methods import make_estimator
 from ..model_file import load_model
 from .speed_graph import Graph, Pass, jitter, latencies
@@ -105,6 +106,7 @@ class Live:
         """Samples a second of the estimator's own computing, in this process."""
         recording = read_bag(bag)
         estimator = make_estimator(load_model(str(self.model)), recording.test, "constrained_kalman")
+        assert isinstance(estimator, CompiledEstimator)
         part = recording.time_ns[:1000], recording.values[:1000]
         return 1000.0 / per_call(lambda: estimator.follow(estimator.init(), *part))
 

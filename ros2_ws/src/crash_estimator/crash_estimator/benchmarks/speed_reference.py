@@ -35,6 +35,7 @@ class Problem(NamedTuple):
 def regressions(structure: Structure, recording: Recording) -> Problem:
     """Those that the constrained Kalman filter meets on the recording, from the first that tells anything."""
     estimator = make_estimator(structure, recording.test, "constrained_kalman", compiled=False)
+    assert isinstance(estimator, Estimator)
     state, met = estimator.init(), []
     for sample in recording.samples():
         kinematics, motion = estimator.kinematics.step(state.kinematics, sample)

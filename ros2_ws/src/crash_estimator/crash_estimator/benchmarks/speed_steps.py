@@ -3,12 +3,14 @@
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import njit
 
 from crash_replay.synthetic.recordings import SCENARIOS
 
+from ..core.compiled.estimator import CompiledEstimator
 from ..core.compiled.factors import widen
 from ..core.compiled.kalman import kalman_update
 from ..core.estimators.kalman import SMALLEST_SHARE
@@ -18,8 +20,15 @@ from ..model_file import load_model
 from .speed_reference import Compiled, Problem, filterpy_step, regressions
 from .speed_row import Row, microseconds, per_call
 
-MRLS = {"forgetting": 0.98, "m": 5, "cr": 3.0, "limit": 2.58, "rewinds": 10}
-SETTINGS = {"forgetting": 0.98, "m": 5, "cr": 3.0, "error_limit": 2.58, "rewinds": 10, "step_limit": 1e9}
+MRLS: dict[str, Any] = {"forgetting": 0.98, "m": 5, "cr": 3.0, "limit": 2.58, "rewinds": 10}
+SETTINGS: dict[str, Any] = {
+    "forgetting": 0.98,
+    "m": 5,
+    "cr": 3.0,
+    "error_limit": 2.58,
+    "rewinds": 10,
+    "step_limit": 1e9,
+}
 
 
 @njit(cache=True)
@@ -69,6 +78,7 @@ def _kalman_calls(structure, recording, problem: Problem) -> Iterator[Row]:
     middle = list(recording.samples())[len(recording) // 2]
     for method in ("constrained_kalman", "mrls"):
         estimator = make_estimator(structure, recording.test, method)
+        assert isinstance(estimator, CompiledEstimator)
         state = estimator.init()
         state, _ = estimator.follow(state, recording.time_ns[: middle.number], recording.values[: middle.number])
         time_ns, values = recording.time_ns[middle.number :][:1], recording.values[middle.number :][:1]

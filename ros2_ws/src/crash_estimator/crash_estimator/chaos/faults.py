@@ -22,8 +22,10 @@ class Disturbed(Protocol):
     def process(self, name: str) -> int: ...  # its number; 0: there is none (yet)
     def since_start(self, name: str) -> float: ...  # s since it was started
 
-    played: float  # % of the samples
-    since_finish: float  # s since the last sample; negative: not yet
+    @property
+    def played(self) -> float: ...  # % of the samples
+    @property
+    def since_finish(self) -> float: ...  # s since the last sample; negative: not yet
 
 
 class Faults:

@@ -62,7 +62,7 @@ class Node:
         return [*self.arguments, "--ros-args", *self.ros_arguments, *remapped]
 
 
-MODULES = {
+MODULES: dict[str, dict[str, Any]] = {
     "launch": {"LaunchDescription": list, "LaunchContext": LaunchContext},
     "launch.actions": {
         one.__name__: one for one in (DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler)

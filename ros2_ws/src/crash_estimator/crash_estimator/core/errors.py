@@ -33,9 +33,9 @@ def equation_errors(description, estimates: Sequence[Estimate]) -> list[Equation
         valid = ~np.isnan(measured)
         measured, predicted = measured[valid], predicted[valid]
         if not len(measured):
-            rows.append(EquationError(name, unit, 0, *[float("nan")] * 7))
+            rows.append(EquationError._make((name, unit, 0, *[float("nan")] * 7)))
             continue
         error = measured - predicted
         statistics = [float(f(x)) for x in (measured, predicted, error) for f in (np.mean, np.var)]
-        rows.append(EquationError(name, unit, len(error), *statistics, float(np.sqrt(np.mean(error**2)))))
+        rows.append(EquationError._make((name, unit, len(error), *statistics, float(np.sqrt(np.mean(error**2))))))
     return rows

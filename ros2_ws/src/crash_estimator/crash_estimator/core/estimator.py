@@ -4,7 +4,7 @@
 in a node, offline, and again from any sample whose state was kept.
 """
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -23,6 +23,9 @@ class Method(Protocol):
 
     One with a setting `regressor_errors` that is false gets a regression whose motion is taken as true.
     """
+
+    @property
+    def settings(self) -> Any: ...  # of the parameters
 
     def init(self, equations: int): ...
 

@@ -42,20 +42,20 @@ class AnyEstimator(Protocol):
     def step(self, state: Any, sample: Sample) -> tuple[Any, Estimate]: ...
 
 
-def _masses(structure: Structure, test: Test, settings: MassSettings, name: str) -> AnyEstimator:
+def _masses(structure: Structure, test: Test, settings: Any, name: str) -> AnyEstimator:
     return EffectiveMass(structure, test, settings)
 
 
 class Recipe(NamedTuple):
     """How a method is made: its class, where it differs from the class's defaults, and what it takes of a structure."""
 
-    kind: Callable[..., Any]
-    settings: dict[str, float | int | bool] = {}
+    kind: type[Any]
+    settings: dict[str, Any] = {}
     structure: Callable[[Structure], Structure] = lambda structure: structure
     estimator: Callable[[Structure, Test, Method, str], AnyEstimator] = Estimator
-    thesis: dict[str, float | int | bool] = {}  # settings with which it is the recursion that the thesis prints
+    thesis: dict[str, Any] = {}  # settings with which it is the recursion that the thesis prints
 
-    def defaults(self, preset: str = "ours") -> dict[str, float | int | bool]:
+    def defaults(self, preset: str = "ours") -> dict[str, Any]:
         """Settings that differ from the class's, by preset."""
         return self.settings | (self.thesis if preset == "thesis" else {})
 

@@ -71,8 +71,8 @@ class Listening:
         self.watch.look()
         self._tell_of_processes()
         for finding in self.watch.new_findings() if self.story else ():
-            tell = self.story.ranking if isinstance(finding, RankingBlock) else self.story.misfit
-            for line in tell(finding):
+            told = self.story.ranking(finding) if isinstance(finding, RankingBlock) else self.story.misfit(finding)
+            for line in told:
                 self.terminal.say(line)
 
     def _tell_of_processes(self) -> None:

@@ -49,9 +49,8 @@ def _run(arguments: argparse.Namespace) -> int:
     for one in _results(parts, arguments):
         with results.open("a", encoding="utf-8") as file:
             file.write(json.dumps(one) + "\n")
-        is_well, row = (is_sound, method_row) if isinstance(one, Endured) else (is_flat, node_row)
-        say(" ".join(row(one)))
-        sound &= is_well(one)
+        say(" ".join(method_row(one) if isinstance(one, Endured) else node_row(one)))
+        sound &= is_sound(one) if isinstance(one, Endured) else is_flat(one)
     write_markdown(arguments.to, [page(*kept(results))])
     return 0 if sound else 1
 

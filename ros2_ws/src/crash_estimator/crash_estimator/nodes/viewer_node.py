@@ -122,8 +122,10 @@ class ViewerNode(Node):
         test = test_from_msg(message)  # raises where it cannot be a test
         self.total = message.samples
         self.account.begin_test(message.samples)
-        for estimates in (*self.estimates.values(), *self.revised.values()):
-            estimates.begin_test()
+        for whole in self.estimates.values():
+            whole.begin_test()
+        for revised in self.revised.values():
+            revised.begin_test()
         self.test = test
         self.recorder.put(partial(test_block, message))
 
@@ -199,7 +201,8 @@ class ViewerNode(Node):
 
 def structure_named(paths: Sequence[str], name: str) -> Structure | None:
     """The model of this name, from one of the files or a ready one."""
-    for path in (*paths, ready_models().get(name)):
+    ready = ready_models().get(name)
+    for path in [*paths, *([str(ready)] if ready else [])]:
         structure = load_model(path) if path else None
         if structure and structure.name == name:
             return structure

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,7 @@ FRONTAL = {"forgetting": 0.5, "m": 5, "cr": 3.0, "error_limit": 1.0, "step_limit
 SIDE = {"forgetting": 0.8, "m": 4, "cr": 3.0, "error_limit": 1.0, "step_limit": 0.5}
 """Forgetting, m and the error limit of sigma / sqrt(m) are table 5.3's; its cr (50 and 20) overshoots on our curves."""
 
-GAUSS_NEWTON = {"memory": 0.02, "noise_memory": 0.1, "known_to": np.inf}
+GAUSS_NEWTON: dict[str, Any] = {"memory": 0.02, "noise_memory": 0.1, "known_to": np.inf}
 """80 samples are too few for the noise model to wait, and K/M starts near its value."""
 PASSES = 3
 """Of recursive Gauss-Newton over a record whose noise model is estimated: the noise model is not linear, so that "an
@@ -39,7 +39,7 @@ SETTLED = 0.015
 class Run(NamedTuple):
     description: Description
     estimates: list[Estimate]
-    state: object
+    state: Any  # the estimator and its last state
 
 
 class Ratios(NamedTuple):
@@ -276,8 +276,8 @@ def alike(seeds: int) -> Alike:
         )
         same.append(compare_tests(first, twin, exact.sample_period))
         other.append(compare_tests(first, stranger, exact.sample_period))
-    rings = tuple(modes(found[0], exact.sample_period)[0].frequency for found in (first, stranger))
-    return Alike(same, other, rings)
+    ours, others = (modes(found[0], exact.sample_period)[0].frequency for found in (first, stranger))
+    return Alike(same, other, (ours, others))
 
 
 def _coloured(n: int, d: tuple[float, float], seed: int) -> np.ndarray:

@@ -6,7 +6,7 @@ is left with 0 alone; then the range is widened up to a coarser tick.
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import rerun.blueprint as rrb
 from rerun.blueprint.api import Container, View
@@ -39,14 +39,15 @@ def plots(part: Container | View, width: float = SCREEN[0], height: float = SCRE
         return
     if not (contents := list(part.contents)):
         return
-    columns, rows = [1.0], [1.0]
+    columns: Any = [1.0]  # shares, as any of the sequences that Rerun takes
+    rows: Any = [1.0]
     if isinstance(part, rrb.Horizontal):
         columns = part.column_shares or [1.0] * len(contents)
     elif isinstance(part, rrb.Vertical):
         rows = part.row_shares or [1.0] * len(contents)
     elif isinstance(part, rrb.Grid):
-        across = part.grid_columns or math.ceil(math.sqrt(len(contents)))
-        columns, rows = [1.0] * across, [1.0] * math.ceil(len(contents) / across)
+        count = part.grid_columns or math.ceil(math.sqrt(len(contents)))
+        columns, rows = [1.0] * count, [1.0] * math.ceil(len(contents) / count)
     for k, child in enumerate(contents):
         across, down = (columns[k % len(columns)], rows[k // len(columns) % len(rows)])
         yield from plots(child, width * across / sum(columns), height * down / sum(rows))

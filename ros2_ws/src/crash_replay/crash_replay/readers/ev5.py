@@ -6,7 +6,7 @@ The fields follow NHTSA's test reference guide, version 5.
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..limits import HEADER_FILE, Range, file_wrong, shown
 from ..recording import RecordingError
@@ -98,17 +98,17 @@ def read_header(path: Path) -> Header:
             raise RecordingError(
                 f"{path}: expected an EV5 header with a section `----- {wanted} -----` and records in it"
             )
-    curves, wrong = _curves(path, sections["INSTRUMENTATION"])
-    line, test = sections["TEST"][0]
+    curves, faults = _curves(path, sections["INSTRUMENTATION"])
+    at, test = sections["TEST"][0]
     if len(test) < TEST_FIELDS:
-        raise RecordingError(f"{path}:{line}: expected {TEST_FIELDS} fields in a TEST record, found {len(test)}")
+        raise RecordingError(f"{path}:{at}: expected {TEST_FIELDS} fields in a TEST record, found {len(test)}")
     return Header(
         number=_test_number(path, lines),
         title=test[1],
         date=test[3],
         laboratory=test[4],
         configuration=test[8],
-        closing_speed=_number(path, line, "closing speed", _stated(test[14]), SPEED),
+        closing_speed=_number(path, at, "closing speed", _stated(test[14]), SPEED),
         impact_angle=_angle(test[15]),
         masses={
             int(_number(path, n, "vehicle", f[0], NUMERIC["vehicle"][1])): _number(
@@ -118,7 +118,7 @@ def read_header(path: Path) -> Header:
             if len(f) > 10
         },
         curves=curves,
-        wrong=wrong,
+        wrong=faults,
     )
 
 
@@ -129,7 +129,9 @@ def _test_number(path: Path, lines: Sequence[str]) -> str:
     return path.stem.lstrip("vV")
 
 
-def _curves(path: Path, records: Sequence[tuple[int, Sequence[str]]]) -> tuple[tuple[Curve, ...], tuple]:
+def _curves(
+    path: Path, records: Sequence[tuple[int, Sequence[str]]]
+) -> tuple[tuple[Curve, ...], tuple[tuple[str, str], ...]]:
     """The curves, and of each record at fault why and where: it costs only itself. Raises where none is left."""
     curves, wrong = [], []
     for line, fields in records:
@@ -157,7 +159,7 @@ def _curve(path: Path, line: int, fields: Sequence[str]) -> Curve:
         raise RecordingError(
             f"{path}:{line}: expected {len(Curve._fields)} fields in an INSTRUMENTATION record, found {len(fields)}"
         )
-    given = dict(zip(Curve._fields, (field.strip() for field in fields), strict=False))
+    given: dict[str, Any] = dict(zip(Curve._fields, (field.strip() for field in fields), strict=False))
     for name, (kind, limit) in NUMERIC.items():
         # what is not determined is left blank: a velocity then is none, a count is an error
         unstated = name == "initial_velocity" and given[name].upper() in UNKNOWN

@@ -115,7 +115,8 @@ class Afmm:
         models = _normalised([self._weighed(model, mean, noise) for model in state.models])
         best = _likeliest(models)
         noise = self._learn_noise(noise, mean, best.products)
-        reported, events = state.reported, ()
+        reported = state.reported
+        events: tuple[Event, ...] = ()
         known = reported + RESOLUTION * self.interval
         late = sum(np.exp(model.log_weight) for model in models if model.jumped > known)
         if late > self.threshold and best.jumped > known:

@@ -5,7 +5,7 @@ structures unload elastically or along a line whose slope the model knows.
 """
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -129,7 +129,7 @@ def _specimen(  # noqa: PLR0913 - the parts that a structure is told by
         name, f"Simulated: {STRUCTURES[name].__doc__.rstrip('.')}", System(bodies, tuple(elements)),
         (*sensors, *measured), duration, max_step=STEP,
     )  # fmt: skip
-    model = {
+    model: dict[str, Any] = {
         "name": name,
         "bodies": {b.name: _model_body(b, axis, bool(measured)) for b in bodies},
         "elements": {e.name: model_element(e, t, part.stiffness) for e, t, part in zip(elements, told, parts)},
