@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import rclpy
 from crash_msgs.msg import Parameters, ParametersBlock, Residuals, ResidualsBlock, Samples, TestInfo
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.executors import Executor
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
