@@ -23,8 +23,7 @@ the diagnosis; `shown`, the estimators and the viewer; `demo`, the demonstration
 writes is judged by its exit status alone. launch is not among the wheels: a stand-in of ours starts the
 processes of the launch file, calls its handlers when one ends, and ends the others as launch does; `launch`
 itself is only stopped, never killed. A full disk is a limit on the size of what a process writes, from that
-moment on; it holds for the shared memory of the middleware too, so that who is stopped meanwhile may hear that
-process no more, asks in vain, and is named when the replay has waited its `finish_timeout`.
+moment on.
 
 A case's name is all that decides it: use, recording, and each fault as `kind:member@moment:duration`, the
 moment in s since the member's start, in % of the samples sent, or in s after the last sample. `make chaos
