@@ -198,7 +198,8 @@ def rattling(base: Base) -> Setup:
 
 
 def metered(base: Base) -> branches.Branch:
-    return strange.MeteringPin(base.share(0.4, 0.8) * base.peak.f / (base.peak.x * base.peak.v))
+    c = base.share(0.15, 0.3) * base.peak.f / base.peak.v**2
+    return strange.MeteringPin(c, base.share(1.3, 1.8) * base.peak.x)
 
 
 def sloshing(base: Base) -> Setup:
