@@ -22,22 +22,38 @@ class Maxwell(Branch):
 
 
 @dataclass(frozen=True)
+class TwoMaxwell(Branch):
+    """Two of them side by side, as the Prony series of a foam or a rubber has them; the second relaxes sooner."""
+
+    slow: Maxwell
+    fast: Maxwell
+    size = 2
+
+    def force(self, x: float, v: float, z: Z, mode: int) -> float:
+        return z[0] + z[1]
+
+    def flow(self, x: float, v: float, z: Z, mode: int) -> Z:
+        return (*self.slow.flow(x, v, z[:1], mode), *self.fast.flow(x, v, z[1:], mode))
+
+
+@dataclass(frozen=True)
 class VentedGas(Branch):
     """A bag of gas, l long, of area a, with a hole: F = (p - p0) a while it is pressed.
 
-    Isentropic: p = p0 (m / (1 - x / l))^1.4, m the share of the gas that is left; it leaves by dm/dt = -w sqrt(p / p0
-    - 1) while p > p0 (the orifice of R. Wagner and others' airbags, incompressible as below a third of the speed of
-    sound).
+    p = p0 (m / (1 - x / l))^n, m the share of the gas that is left, n 1.4 where no heat leaves it and 1 where it stays
+    as warm as it was; it leaves by dm/dt = -w sqrt(p / p0 - 1) while p > p0 (the orifice of R. Wagner and others'
+    airbags, incompressible as below a third of the speed of sound).
     """
 
     force_unit: float  # p0 a, N
     length: float
     w: float  # 1/s
+    n: float = 1.4
     size = 1  # 1 - m
 
     def over(self, x: float, z: Z) -> float:
         room = max(1.0 - max(x, 0.0) / self.length, 0.02)
-        return max((max(1.0 - z[0], 1e-3) / room) ** 1.4 - 1.0, 0.0)
+        return max((max(1.0 - z[0], 1e-3) / room) ** self.n - 1.0, 0.0)
 
     def force(self, x: float, v: float, z: Z, mode: int) -> float:
         return self.force_unit * self.over(x, z) if x > 0.0 else 0.0

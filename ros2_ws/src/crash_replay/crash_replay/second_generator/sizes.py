@@ -97,14 +97,24 @@ def line(base: Base) -> dict:
     return {"unload": base.peak.f / base.peak.x * base.share(2.5, 7.0)}
 
 
-def maxwell(base: Base) -> branches.Branch:
+def maxwell(base: Base) -> flowing.Maxwell:
     c = base.share(0.25, 0.4) * base.peak.f / base.peak.v
     return flowing.Maxwell(c / (base.share(0.1, 0.25) * base.setup.until), c)
 
 
-def gas(base: Base) -> branches.Branch:
-    length = base.share(1.2, 1.5) * base.peak.x
-    return flowing.VentedGas(base.share(0.15, 0.25) * base.peak.f, length, base.share(2.0, 5.0) / base.setup.until)
+def two_maxwell(base: Base) -> branches.Branch:
+    slow = maxwell(base)
+    share, sooner = base.share(0.3, 0.5), base.share(0.2, 0.4)
+    fast = flowing.Maxwell(share * slow.k, sooner * share * slow.c)
+    return flowing.TwoMaxwell(flowing.Maxwell((1.0 - share) * slow.k, (1.0 - share) * slow.c), fast)
+
+
+def gas(n: float) -> Callable[[Base], branches.Branch]:
+    def make(base: Base) -> branches.Branch:
+        length, leak = base.share(1.2, 1.5) * base.peak.x, base.share(2.0, 5.0) / base.setup.until
+        return flowing.VentedGas(base.share(0.15, 0.25) * base.peak.f, length, leak, n)
+
+    return make
 
 
 # --- bodies
