@@ -52,7 +52,7 @@ class Record(OfTheTest):
         if number:
             self.process.send_signal(number)
         output, errors = self.process.communicate(timeout=timeout)
-        logged = [line for line in errors.splitlines() if not line.startswith("[") and "RTPS_" not in line]
+        logged = [line for line in errors.splitlines() if not line.startswith("[")]
         return self.process.returncode, output.strip(), "\n".join(logged)
 
 

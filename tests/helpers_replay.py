@@ -93,8 +93,6 @@ class Replay(OfTheTest):
 
     def end(self, timeout: float = PATIENCE) -> tuple[int, str, str]:
         output, _ = self.process.communicate(timeout=timeout)
-        # what processes that were killed have left in shared memory makes Fast DDS complain, to nobody's harm
-        output = "".join(line for line in output.splitlines(keepends=True) if "RTPS_" not in line)
         errors = self.errors_so_far()
         self.errors.close()
         return self.process.returncode, output, errors
