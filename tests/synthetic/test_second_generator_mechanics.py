@@ -19,10 +19,11 @@ from crash_replay.second_generator.branches import (
     TanhFriction,
 )
 from crash_replay.second_generator.curves import Bilinear, Cubic, Folding, Plateau, Progressive, Stop, Straight, Sum
+from crash_replay.second_generator.flowing import Maxwell, VentedGas
 from crash_replay.second_generator.joint import Joint
 from crash_replay.second_generator.machine import Body, Machine, Motion
 from crash_replay.second_generator.rates import CowperSymonds, Logarithmic, Power
-from crash_replay.second_generator.strange import Fracture, Maxwell, Rattle, VentedGas
+from crash_replay.second_generator.strange import Fracture, Rattle
 from crash_replay.second_generator.structures import draw
 
 M, V, K = 1000.0, 10.0, 4e5

@@ -68,6 +68,7 @@ class Effect:
     high: float = np.inf
     size: float | None = None  # order of magnitude of the coefficient; None: what carries half of the target's force
     of_crush_only: bool = False  # its force is a function of the crush alone
+    rare: bool = False  # looked for only where the others leave more than noise, or take several to leave it
 
     # What it acts on
     acts_on: ClassVar[str] = "element"  # the key of a model file: element, body, channel or between
@@ -105,6 +106,10 @@ class Effect:
     def trial(self, motion: ElementMotion, **shapes: float) -> np.ndarray:
         """What its function gives on a motion that a user's effect is tried on."""
         return getattr(self, self.function)(motion, **shapes)
+
+    def common(self) -> "Effect | None":
+        """What of it is looked for first: all of it, or None of a rare one; of several forms it may be some."""
+        return None if self.rare else self
 
     def put_to_work(self, structure: Structure, test: Test, spec: EffectSpec) -> Structure:
         """The structure as estimators and free runs take it: with this effect in its elements, masses or actions.

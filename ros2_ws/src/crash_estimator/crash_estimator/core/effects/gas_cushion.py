@@ -32,6 +32,7 @@ EFFECT = RememberingForce(
     },
     memory=memory,
     bounded=False,
+    rare=True,
 )
 """Limits of the leak: what loses less than half of its gas within 100 ms at twice the pressure outside is a spring,
 which other effects are; what has lost it within 3 ms is hardly felt."""

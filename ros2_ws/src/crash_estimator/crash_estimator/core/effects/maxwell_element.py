@@ -31,6 +31,7 @@ EFFECT = RememberingForce(
     {"relaxation_time": Shape("s", 3e-3, 0.1, (6e-3, 0.03))},
     memory=memory,
     bounded=False,
+    rare=True,
 )
 """Its limits: at the 50 Hz of a structure's own motion a spring that relaxes in 3 ms gives as much of it as the damper
 does (w T = 1), below it is a damper; as long as a crash takes, and it is a spring."""

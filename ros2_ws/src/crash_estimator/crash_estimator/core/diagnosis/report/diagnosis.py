@@ -104,8 +104,8 @@ def diagnose(
     recordings, clipped = without_clipped(recordings)
     structure, recordings = with_accelerations(structure, recordings)
     with time_limit(seconds):
-        records, zero, unused = _observed(structure, recordings, effects)
-        path = first_believed(select(structure, records, effects))
+        records, zero, unused = _observed(structure, recordings, _common(structure, effects))
+        path = _missing(structure, records, effects)
         stopped = out_of_time()
     found = _answer(structure, path, tolerance, zero)
     remarks = [clipped] if clipped else []
@@ -114,6 +114,25 @@ def diagnose(
     if stopped:
         remarks.append(f"stopped after {seconds:g} s: not everything was tried")
     return replace(found, stopped=stopped, text="; ".join([found.text, *remarks]))
+
+
+def _common(structure: Structure, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
+    """Those that are looked for first; what the model has already is one of them."""
+    has = {spec.type for spec in structure.effects}
+    found = {name: effect if name in has else effect.common() for name, effect in effects.items()}
+    return {name: effect for name, effect in found.items() if effect}
+
+
+def _missing(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
+    """What the structure lacks, of the common effects; of all, where with them fewer leave noise. A rare one that
+    leaves more than noise is not believed: it bends further than most."""
+    common = _common(structure, effects)
+    path = first_believed(select(structure, records, common))
+    if common == effects or (path.final.white and len(path.added) < 2) or out_of_time():
+        return path
+    other = first_believed(select(structure, records, effects))
+    fewer = not path.final.white or len(other.added) < len(path.added)
+    return other if other.final.white and fewer else path
 
 
 def _observed(
