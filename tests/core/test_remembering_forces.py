@@ -56,8 +56,7 @@ def test_hysteresis_of_a_motion_without_bounds_ends_at_once(far):
 
 
 def maxwell(time, crush, start=0.0, relaxation_time=0.01):
-    step = np.diff(time, prepend=time[0])
-    return EFFECTS["maxwell_element"].memory(step, crush, start, relaxation_time=relaxation_time)
+    return EFFECTS["maxwell_element"].memory(time, crush, start, relaxation_time=relaxation_time)
 
 
 def test_a_maxwell_element_relaxes_as_its_equation_says():
@@ -88,7 +87,7 @@ def test_a_maxwell_element_is_a_damper_where_it_relaxes_at_once_and_a_spring_whe
 
 
 def cushion(time, crush, start=0.0, length=0.2, leak=0.0):
-    return EFFECTS["gas_cushion"].memory(np.diff(time, prepend=time[0]), crush, start, length=length, leak=leak)
+    return EFFECTS["gas_cushion"].memory(time, crush, start, length=length, leak=leak)
 
 
 def test_a_tight_gas_cushion_is_an_adiabatic_spring_and_one_with_a_hole_loses_what_its_equation_says():

@@ -86,8 +86,9 @@ def test_back_ahead_round_and_late(stage, recording, whole):
         assert state.asked_again == n - 250
         assert stamp_ns(state.header.stamp) == stamp_ns(heard["parameters"][-30].header.stamp)
 
-    stage.add_estimator("late", model=MODEL, method="mrls")
+    node = stage.add_estimator("late", model=MODEL, method="mrls")
     stage.wait_until_found(3)
+    stage.spin_until(lambda: node.follower, "it knows the test")  # samples that overtake it are asked for later
     burst(120, 30)
     late = stage.wait_for("late", 30 + 1)  # what the pass had before it came is in one message
     assert numbers(late["parameters"]) == list(range(90, 150))

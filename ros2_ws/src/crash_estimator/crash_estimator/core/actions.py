@@ -235,5 +235,4 @@ def trace(structure: Structure, action: Action, motion: ElementMotion) -> np.nda
     """(g,) What an action of kind "memory" remembers along a motion from first contact on."""
     tension = structure.elements[action.at].tension
     crush = motion.crush if tension else np.maximum(motion.crush, 0.0)
-    step = np.diff(motion.time, prepend=motion.time[0])
-    return action.force(np.concatenate([[0.0], step]), np.concatenate([[0.0], crush]), 0.0)[0][1:]
+    return action.force(np.concatenate([motion.time[:1], motion.time]), np.concatenate([[0.0], crush]), 0.0)[0][1:]

@@ -103,11 +103,11 @@ class Contact:
         return ContactState(peak, peak_rate, state, pressed, memory), law, self._events(before.state, state, crush)
 
     def _remembered(self, before: ContactState, crush: np.ndarray, dt: float) -> np.ndarray:
-        step, memory = np.array([0.0, dt]), before.memory.copy()
+        time, memory = np.array([0.0, dt]), before.memory.copy()
         for j, action in enumerate(self.actions):
             if action.kind == "memory":
                 way = np.array([before.crush[action.at], crush[action.at]])
-                memory[j] = action.force(step, way, before.memory[j])[0][-1]
+                memory[j] = action.force(time, way, before.memory[j])[0][-1]
         return memory
 
     def _events(self, before: np.ndarray, after: np.ndarray, crush: np.ndarray) -> tuple[Event, ...]:

@@ -162,10 +162,10 @@ class _System:
 
     def remembered(self, before: _State, t: float, crush: np.ndarray) -> np.ndarray:
         """(n,) what the actions remember at a crush within the step, or at its end."""
-        step, memory = np.array([0.0, t - before.time]), before.memory.copy()
+        time, memory = np.array([before.time, t]), before.memory.copy()
         for j, action in self.remembering:
             way = np.array([before.crush[action.at], self.pressed(crush)[action.at]])
-            memory[j] = action.force(step, way, before.memory[j])[0][-1]
+            memory[j] = action.force(time, way, before.memory[j])[0][-1]
         return memory
 
     def forces(self, t: float, state: _State) -> np.ndarray:

@@ -201,8 +201,7 @@ class ViewerNode(Node):
 
 def structure_named(paths: Sequence[str], name: str) -> Structure | None:
     """The model of this name, from one of the files or a ready one."""
-    ready = ready_models().get(name)
-    for path in [*paths, *([str(ready)] if ready else [])]:
+    for path in (*paths, str(ready_models().get(name, ""))):
         structure = load_model(path) if path else None
         if structure and structure.name == name:
             return structure

@@ -22,21 +22,6 @@ class Maxwell(Branch):
 
 
 @dataclass(frozen=True)
-class TwoMaxwell(Branch):
-    """Two of them side by side, as the Prony series of a foam or a rubber has them; the second relaxes sooner."""
-
-    slow: Maxwell
-    fast: Maxwell
-    size = 2
-
-    def force(self, x: float, v: float, z: Z, mode: int) -> float:
-        return z[0] + z[1]
-
-    def flow(self, x: float, v: float, z: Z, mode: int) -> Z:
-        return (*self.slow.flow(x, v, z[:1], mode), *self.fast.flow(x, v, z[1:], mode))
-
-
-@dataclass(frozen=True)
 class VentedGas(Branch):
     """A bag of gas, l long, of area a, with a hole: F = (p - p0) a while it is pressed.
 

@@ -115,7 +115,7 @@ FORMS: dict[str, Form] = {
     "rate.power": Form("rate_hardening", CONTACTS, sizes.changed(sizes.power)),
     "rate.log": Form("rate_hardening", CONTACTS, sizes.changed(sizes.log)),
     "flow.maxwell": Form("maxwell_element", ELEMENTS, sizes.beside(sizes.maxwell)),
-    "flow.prony": Form("maxwell_element", ELEMENTS, sizes.beside(sizes.two_maxwell)),
+    "flow.prony": Form("maxwell_element", ELEMENTS, sizes.prony),
     "flow.gas": Form("gas_cushion", CONTACTS, sizes.beside(sizes.gas(1.4)), straight=True),
     "flow.isothermal": Form("gas_cushion", CONTACTS, sizes.beside(sizes.gas(1.0)), straight=True),
     "hysteresis.boucwen": Form(

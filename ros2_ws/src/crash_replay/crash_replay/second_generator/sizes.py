@@ -102,11 +102,13 @@ def maxwell(base: Base) -> flowing.Maxwell:
     return flowing.Maxwell(c / (base.share(0.1, 0.25) * base.setup.until), c)
 
 
-def two_maxwell(base: Base) -> branches.Branch:
-    slow = maxwell(base)
+def prony(base: Base) -> Setup:
+    """Two side by side, the second of which relaxes sooner: a Prony series, as of a foam or a rubber."""
+    whole = maxwell(base)
     share, sooner = base.share(0.3, 0.5), base.share(0.2, 0.4)
-    fast = flowing.Maxwell(share * slow.k, sooner * share * slow.c)
-    return flowing.TwoMaxwell(flowing.Maxwell((1.0 - share) * slow.k, (1.0 - share) * slow.c), fast)
+    joint = base.joint.with_branch(flowing.Maxwell((1.0 - share) * whole.k, (1.0 - share) * whole.c))
+    joint = joint.with_branch(flowing.Maxwell(share * whole.k, sooner * share * whole.c))
+    return base.setup.with_joint(base.target, joint)
 
 
 def gas(n: float) -> Callable[[Base], branches.Branch]:

@@ -15,11 +15,11 @@ from .effect import Shape
 from .kinds import RememberingForce
 
 
-def memory(step: np.ndarray, crush: np.ndarray, start: float, length: float, leak: float, form: str = ""):
+def memory(time: np.ndarray, crush: np.ndarray, start: float, length: float, leak: float, form: str = ""):
     """y (g,) from `start` at the first of the crushes (g,) m, and how it follows: see `RememberingForce`."""
     from .vented_gas import trace  # the compiler takes long to import: only who needs it waits for it
 
-    step, crush = (np.ascontiguousarray(each, dtype=float) for each in (step, crush))
+    step, crush = np.diff(time, prepend=time[0]), np.ascontiguousarray(crush, dtype=float)
     return trace(step, crush, float(start), float(length), float(leak))
 
 

@@ -16,7 +16,7 @@ from .effect import Shape
 from .kinds import RememberingForce
 
 
-def memory(step: np.ndarray, crush: np.ndarray, start: float, yield_crush: float, exponent: float, form: str = ""):
+def memory(time: np.ndarray, crush: np.ndarray, start: float, yield_crush: float, exponent: float, form: str = ""):
     """z (g,) from `start` at the first of the crushes (g,) m, and how it follows: see `RememberingForce`."""
     back = 1.0 if form == "dahl" else 0.0
     from .bouc_wen import trace  # the compiler takes long to import: only who needs it waits for it

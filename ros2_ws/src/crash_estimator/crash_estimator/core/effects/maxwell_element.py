@@ -15,11 +15,11 @@ from .effect import Shape
 from .kinds import RememberingForce
 
 
-def memory(step: np.ndarray, crush: np.ndarray, start: float, relaxation_time: float, form: str = ""):
+def memory(time: np.ndarray, crush: np.ndarray, start: float, relaxation_time: float, form: str = ""):
     """z (g,) m from `start` at the first crush (g,) m on, and how it follows: see `RememberingForce`."""
     from .relaxation import trace  # the compiler takes long to import: only who needs it waits for it
 
-    turns = np.asarray(step, dtype=float) / relaxation_time
+    turns = np.diff(time, prepend=time[0]) / relaxation_time
     kept = np.exp(-turns)
     by_crush = np.divide(-np.expm1(-turns), turns, out=np.ones_like(turns), where=turns > 0.0)
     return trace(np.ascontiguousarray(crush, dtype=float), float(start), kept, by_crush), kept, by_crush, by_crush

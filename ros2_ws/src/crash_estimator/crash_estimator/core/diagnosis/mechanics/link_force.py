@@ -190,8 +190,7 @@ def _inside(term: Term, theta: np.ndarray, at: np.ndarray) -> _Inside:
 def _remembered(term: Term, link: Link, theta, time, x, beside: _Beside, parameters, columns) -> Memory:
     """c z is added to the forces beside the spring, derivatives are appended -> its memory."""
     c, shapes = theta[term.coefficient], term.shapes_at(theta)
-    step = np.concatenate([[0.0], np.diff(time, prepend=time[0])])
-    memory = partial(term.addition.effect.memory, step, form=term.addition.variant)
+    memory = partial(term.addition.effect.memory, np.concatenate([time[:1], time]), form=term.addition.variant)
     crush = np.concatenate([[0.0], x if link.tension else np.maximum(x, 0.0)])
     z, kept, by_crush, by_before = (each[1:] for each in memory(crush, 0.0, **shapes))
     parameters += [term.coefficient, *term.shapes.values()]

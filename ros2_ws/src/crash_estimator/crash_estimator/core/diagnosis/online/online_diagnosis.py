@@ -31,6 +31,7 @@ from ..residuals.misfit_windows import misfit_windows
 from ..residuals.residuals import Residuals, analyse, noise_floor, rms
 from ..selection.assumptions import CELLS
 from ..selection.fitted_model import Model
+from ..selection.rare_effects import common_effects
 from ..selection.selection_step import SelectionStep
 from .candidate_turns import ITERATIONS_ON, MOST_ITERATIONS, OnlineState, try_some
 from .online_answer import Change, OnlineAnswer, curves
@@ -73,7 +74,7 @@ class OnlineDiagnosis:
         given = _model(state, records, magnitudes, additions_of(self.structure, magnitudes, self.effects))
         if given is None:
             return state, None
-        state, tried = try_some(state, magnitudes, self.effects, given, out_of_time)
+        state, tried = try_some(state, magnitudes, common_effects(self.structure, self.effects), given, out_of_time)
         residuals = analyse(tried[0].fit) if tried and tried[0].fit else given.residuals
         # what even the best leaves counts as noise
         done = SelectionStep(given, [one._replace(gain=one.gain / max(residuals.mean_square, 1.0)) for one in tried])

@@ -17,8 +17,9 @@ from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import free_run, noise_floor
 from ..residuals.score_test import drift_of
 from ..selection.acceptance import share_removed
-from ..selection.assumptions import SelectionPath, first_believed, select, up_to
+from ..selection.assumptions import SelectionPath, up_to
 from ..selection.fitted_model import Model
+from ..selection.rare_effects import common_effects, select_common_first
 from ..selection.selection_step import fit_of_all
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_limit import out_of_time, time_limit
@@ -104,8 +105,8 @@ def diagnose(
     recordings, clipped = without_clipped(recordings)
     structure, recordings = with_accelerations(structure, recordings)
     with time_limit(seconds):
-        records, zero, unused = _observed(structure, recordings, _common(structure, effects))
-        path = _missing(structure, records, effects)
+        records, zero, unused = _observed(structure, recordings, common_effects(structure, effects))
+        path = select_common_first(structure, records, effects, lambda found: _is_good_enough(found, tolerance))
         stopped = out_of_time()
     found = _answer(structure, path, tolerance, zero)
     remarks = [clipped] if clipped else []
@@ -116,23 +117,9 @@ def diagnose(
     return replace(found, stopped=stopped, text="; ".join([found.text, *remarks]))
 
 
-def _common(structure: Structure, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
-    """Those that are looked for first; what the model has already is one of them."""
-    has = {spec.type for spec in structure.effects}
-    found = {name: effect if name in has else effect.common() for name, effect in effects.items()}
-    return {name: effect for name, effect in found.items() if effect}
-
-
-def _missing(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
-    """What the structure lacks, of the common effects; of all, where with them fewer leave noise. A rare one that
-    leaves more than noise is not believed: it bends further than most."""
-    common = _common(structure, effects)
-    path = first_believed(select(structure, records, common))
-    if common == effects or (path.final.white and len(path.added) < 2) or out_of_time():
-        return path
-    other = first_believed(select(structure, records, effects))
-    fewer = not path.final.white or len(other.added) < len(path.added)
-    return other if other.final.white and fewer else path
+def _is_good_enough(path: SelectionPath, tolerance: Tolerance) -> bool:
+    """Nothing was found to add, and what the model leaves is noise or within the tolerance."""
+    return not path.added and (path.final.white or tolerance.admits(left_by(path.final, band_of(path.final))))
 
 
 def _observed(

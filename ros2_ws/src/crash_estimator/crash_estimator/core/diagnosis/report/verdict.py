@@ -37,13 +37,10 @@ class Verdict(NamedTuple):
 
 
 def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
-    """`adequate`: nothing significant is missing, or what is left of the model as given is within the accuracy of
-    sensors, or nothing is named and it is within the tolerance, and no candidate explains any of it or it is less than
-    the noise; `effect_missing`: what is named beats its rivals and takes a large share of the misfit away; else
-    `unexplained`."""
+    """`adequate`: nothing significant is missing, or nothing is named and what is left of the model as given is within
+    the tolerance, and no candidate explains any of it or it is less than the noise; `effect_missing`: what is named
+    beats its rivals and takes a large share of the misfit away; else `unexplained`."""
     if tolerance.stated and tolerance.admits(evidence.before):
-        return Verdict(ADEQUATE, True)
-    if evidence.before.of_peak < THRESHOLDS.accuracy:
         return Verdict(ADEQUATE, True)
     if evidence.noise:
         word = EFFECT_MISSING if evidence.added else ADEQUATE

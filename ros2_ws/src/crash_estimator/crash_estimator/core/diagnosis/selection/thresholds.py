@@ -49,10 +49,6 @@ class Thresholds(NamedTuple):
     """Of the misfit, that what is named must explain, where what is left is no noise. Of 36 cases of the second
     simulator that were right so, and had been looked at, 35 explained 0.77 and more; of 8 that have a law outside the
     vocabulary 5 had 0.70 and less. What is named rightly on docs/outside.md has 0.82 and more."""
-    accuracy: float = 5e-4
-    """Of the peak, RMS, noise included: below it nothing is missing. A twentieth of what an accelerometer may be off
-    its straight line (SAE J211-1: 1 % of the reading and more). One simulated test has such quiet sensors: a shaken
-    oscillator, where the error of the simulation's own steps (0.02 %) would be named as a damper."""
     varying: float = 0.45
     """Share of what is left that goes along with something varying in time: from it on no effect is named. Of 18
     development cases outside the vocabulary to which an effect was added all had 0.48 and more; of 20 recordings of

@@ -17,9 +17,9 @@ from .element_force import HALF, on_element
 class RememberingForce(Effect):
     """A force c z in parallel to an element's own, compression positive; z is its memory.
 
-    memory(step (g,) s, crush (g,) m, start, form=variant, **shape constants) -> z (g,) from `start` at the first crush
-    on, dz_t/dz_{t-1} (g,), dz_t/dX_t and - dz_t/dX_{t-1} (g,); step: since the instant before, the first counts for
-    nothing. While the element is apart its crush counts as 0: the memory goes on from there.
+    memory(time (g,) s, crush (g,) m, start, form=variant, **shape constants) -> z (g,) from `start` at the first crush
+    on, dz_t/dz_{t-1} (g,), dz_t/dX_t and - dz_t/dX_{t-1} (g,). While the element is apart its crush counts as 0: the
+    memory goes on from there.
     """
 
     memory: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] | None = None
@@ -45,14 +45,9 @@ class RememberingForce(Effect):
 
     def prior_std(self, magnitudes, addition):
         element = magnitudes.element(addition.target)
-        largest = (
-            1.0
-            if self.bounded
-            else max(self._largest(magnitudes.motion(r, element), addition) for r in range(len(magnitudes.records)))
-        )
-        return HALF * magnitudes.force[element] / max(largest, 1e-12)
-
-    def _largest(self, motion, addition) -> float:
-        """Of the memory along a motion."""
-        step = np.diff(motion.time, prepend=motion.time[0])
-        return float(np.abs(self.memory(step, motion.crush, 0.0, form=addition.variant, **addition.shapes)[0]).max())
+        carries = HALF * magnitudes.force[element]
+        if self.bounded:
+            return carries
+        motions = [magnitudes.motion(r, element) for r in range(len(magnitudes.records))]
+        memory = partial(self.memory, form=addition.variant, **addition.shapes)
+        return carries / max(1e-12, *(np.abs(memory(m.time, m.crush, 0.0)[0]).max() for m in motions))

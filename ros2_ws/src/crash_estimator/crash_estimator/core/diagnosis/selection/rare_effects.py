@@ -1,0 +1,52 @@
+"""Rare effects bend far: they are looked for after the common ones, and believed only where they leave noise."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from ...effects.effect import Effect
+from ...structure import Structure
+from ..observation.record import ObservedRecord
+from .assumptions import SelectionPath, first_believed, select
+from .thresholds import THRESHOLDS
+from .time_limit import out_of_time
+
+
+def common_effects(structure: Structure, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
+    """Those that are looked for first; what the model has already is one of them."""
+    has = {spec.type for spec in structure.effects}
+    found = {name: effect if name in has else effect.common() for name, effect in effects.items()}
+    return {name: effect for name, effect in found.items() if effect}
+
+
+def select_common_first(
+    structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect],
+    enough: Callable[[SelectionPath], bool],
+) -> SelectionPath:  # fmt: skip
+    """The effects that a structure lacks: the common ones, or those with rare ones among them that leave noise and are
+    as likely: then both stand in one ranking.
+
+    enough: whether what the common ones leave is good enough, so that none is looked for beside them. The rare ones
+    are tried with what was found; only where they are as good are they set against all the others as well.
+    """
+    common = common_effects(structure, effects)
+    found = first_believed(select(structure, records, common))
+    if common == effects or enough(found):
+        return found
+    named = {addition.effect.name for addition in found.added}
+    tried = {name: effect for name, effect in effects.items() if name in named or effect != common.get(name)}
+    for others in (tried, effects):
+        path = first_believed(select(structure, records, others))
+        if out_of_time() or not _is_as_good(path, found):
+            return found
+    return path
+
+
+def _is_as_good(path: SelectionPath, found: SelectionPath) -> bool:
+    """It leaves noise in the whole band, as the other does not, or is not less likely beyond doubt."""
+    as_likely = path.as_recorded.evidence > found.as_recorded.evidence - THRESHOLDS.confounded
+    return _leaves_noise(path) and (as_likely or not _leaves_noise(found))
+
+
+def _leaves_noise(path: SelectionPath) -> bool:
+    return path.final.white and all(np.isinf(record.below) for record in path.records)
