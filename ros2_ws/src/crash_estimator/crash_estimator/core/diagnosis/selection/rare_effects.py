@@ -7,7 +7,10 @@ import numpy as np
 from ...effects.effect import Effect
 from ...structure import Structure
 from ..observation.record import ObservedRecord
+from ..parameterization.magnitudes import measure_magnitudes
 from .assumptions import SelectionPath, first_believed, select
+from .fitted_model import fit_model
+from .selection_step import in_recorded_noise
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
 
@@ -26,20 +29,30 @@ def select_common_first(
     """The effects that a structure lacks: the common ones, or those with rare ones among them that leave noise and are
     as likely: then both stand in one ranking.
 
-    enough: whether what the common ones leave is good enough, so that none is looked for beside them. The rare ones
-    are tried with what was found; only where they are as good are they set against all the others as well.
+    enough: whether what the common ones leave is good enough, so that none is looked for beside them. Whether a rare
+    one leaves noise is asked of it alone, and beside what was found first; only then is it set against all the others.
     """
     common = common_effects(structure, effects)
     found = first_believed(select(structure, records, common))
     if common == effects or enough(found):
         return found
-    named = {addition.effect.name for addition in found.added}
-    tried = {name: effect for name, effect in effects.items() if name in named or effect != common.get(name)}
-    for others in (tried, effects):
-        path = first_believed(select(structure, records, others))
-        if out_of_time() or not _is_as_good(path, found):
-            return found
-    return path
+    rare = {name: effect for name, effect in effects.items() if effect != common.get(name)}
+    if not _one_leaves_noise(rare, found):
+        return found
+    path = first_believed(select(structure, records, effects))
+    return found if out_of_time() or not _is_as_good(path, found) else path
+
+
+def _one_leaves_noise(rare: Mapping[str, Effect], found: SelectionPath) -> bool:
+    """Whether one of them does, alone or beside what was found first, where without it there is more."""
+    magnitudes = measure_magnitudes(found.structure, found.records, found.cells)
+    for count in (found.present, found.present + 1):
+        model = fit_model(magnitudes, found.records, found.final.additions[:count])
+        if model.white or out_of_time():
+            return False
+        if in_recorded_noise(magnitudes, rare, model).leaves_noise:
+            return True
+    return False
 
 
 def _is_as_good(path: SelectionPath, found: SelectionPath) -> bool:
