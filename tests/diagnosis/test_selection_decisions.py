@@ -102,7 +102,22 @@ def test_an_effect_on_two_elements_is_tried_on_both(monkeypatch, together, pairs
 def test_effects_are_added_one_by_one_as_long_as_they_gain_anything(monkeypatch, gains, added):
     """And no more of them than the most steps there are, whatever they gain."""
     left = iter(gains)
-    monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda m, e, before, path: step(before, next(left)))
+    path, final = one_by_one(monkeypatch, 100.0, lambda before, fitted: step(before, next(left)))
+    assert len(final.additions) == len(path) - 1 == (THRESHOLDS.most_steps if added is None else added)
+
+
+@pytest.mark.parametrize(("left", "fitted"), [(10000.0, [True, True, False]), (100.0, [True] * 5)])
+def test_what_is_still_far_from_noise_is_not_searched_for_more_than_is_believed(monkeypatch, left, fitted):
+    """What is left is looked at, and no candidate fitted to it."""
+    asked = []
+    one_by_one(monkeypatch, left, lambda before, fit: asked.append(fit) or step(before, 500.0 if fit else 0.0))
+    assert asked == fitted
+
+
+def one_by_one(monkeypatch, left: float, search) -> tuple[list, SimpleNamespace]:
+    """Each addition takes a tenth of the mean square away; left: of it at first, search: before, fitted."""
+    said = lambda m, e, before, path, fitted: search(before, fitted)  # noqa: E731
+    monkeypatch.setattr(forward_selection, "in_recorded_noise", said)
     monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done: done)
     monkeypatch.setattr(forward_selection, "_without", lambda model, found: model)
     monkeypatch.setattr(
@@ -112,8 +127,7 @@ def test_effects_are_added_one_by_one_as_long_as_they_gain_anything(monkeypatch,
     )
     monkeypatch.setattr(forward_selection, "analyse", lambda fit: SimpleNamespace(mean_square=1.0))
     monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final, present: (path, final))
-    path, final = forward_selection._one_by_one(None, {}, model(100.0), [], 0)
-    assert len(final.additions) == len(path) - 1 == (THRESHOLDS.most_steps if added is None else added)
+    return forward_selection._one_by_one(None, {}, model(left), [], 0)
 
 
 FALLS_TO_ZERO = dict(tension=False, parallel=(), remembering=(), damping=None, known_damping=0.0)

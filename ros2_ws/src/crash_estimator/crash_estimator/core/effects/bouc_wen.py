@@ -11,26 +11,37 @@ LONGEST = 0.1
 FAR = 25.0
 """Yield crushes, of one step: after so many it has yielded whatever it was, to e^-25."""
 
-SMALL = 1e-6
-"""Of z, and of the yield crush: step of the one-sided differences."""
-
 
 @njit(cache=True)
 def _advanced(z, turns, exponent, back):
-    """z after a crush of `turns` yield crushes; NaN where a motion without bounds has none."""
+    """z after a crush of `turns` yield crushes, and its derivatives by the z before and by the turns.
+
+    NaN where a motion without bounds has none.
+    """
     if not abs(turns) < FAR:
-        return np.sign(turns)
+        return np.sign(turns), 0.0, 0.0
     steps = int(np.ceil(abs(turns) / LONGEST))
+    if steps == 0:
+        return z, 1.0, _slope(z, 1.0, exponent, back)[0]
+    h = turns / steps
+    by_z, by_h = 1.0, 0.0
     for _ in range(steps):
-        h = turns / steps
-        middle = z + 0.5 * h * _slope(z, h, exponent, back)
-        z += h * _slope(middle, h, exponent, back)
-    return min(max(z, -1.0), 1.0)
+        first, first_by_z = _slope(z, h, exponent, back)
+        second, second_by_z = _slope(z + 0.5 * h * first, h, exponent, back)
+        grown = 1.0 + h * second_by_z * (1.0 + 0.5 * h * first_by_z)
+        z += h * second
+        by_z, by_h = grown * by_z, grown * by_h + second + 0.5 * h * second_by_z * first
+    if abs(z) > 1.0:
+        return np.sign(z), 0.0, 0.0
+    return z, by_z, by_h / steps
 
 
 @njit(cache=True)
 def _slope(z, h, exponent, back):
-    return 1.0 - abs(z) ** exponent if z * h > 0.0 else 1.0 + back * abs(z) ** exponent
+    """dz per yield crush, and its derivative by z."""
+    power = abs(z) ** exponent
+    of_way = -1.0 if z * h > 0.0 else back
+    return 1.0 + of_way * power, of_way * exponent * power / z if z != 0.0 else 0.0
 
 
 @njit(cache=True)
@@ -40,8 +51,6 @@ def trace(crush, start, yield_crush, exponent, back):
     z[0] = start
     for t in range(1, g):
         turns = (crush[t] - crush[t - 1]) / yield_crush
-        way = 1.0 if turns >= 0.0 else -1.0
-        z[t] = _advanced(z[t - 1], turns, exponent, back)
-        by_z[t] = (_advanced(z[t - 1] + SMALL, turns, exponent, back) - z[t]) / SMALL
-        by_crush[t] = (_advanced(z[t - 1], turns + way * SMALL, exponent, back) - z[t]) / (way * SMALL * yield_crush)
+        z[t], by_z[t], by_turns = _advanced(z[t - 1], turns, exponent, back)
+        by_crush[t] = by_turns / yield_crush
     return z, by_z, by_crush

@@ -36,24 +36,26 @@ class CandidateFit(NamedTuple):
 
 def fit_candidates(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, thorough: bool = False,
-    in_other_noise: Sequence[CandidateFit] = (), earlier: Sequence[CandidateFit] = (),
+    in_other_noise: Sequence[CandidateFit] = (), earlier: Sequence[CandidateFit] = (), anew: bool = True,
 ) -> list[CandidateFit]:  # fmt: skip
     """All candidates, best first; one for each effect and target.
 
     thorough: try more of them, and harder, where none of the most likely ones leaves white noise. in_other_noise: what
-    was found with other noise, best first; its best fits are gone on from. earlier: what was found for the models
-    before this one.
+    was found with other noise, best first; its best fits are gone on from, and without `anew` nothing else is fitted.
+    earlier: what was found for the models before this one.
     """
     additions = candidates(magnitudes, effects, model.additions)
     given = magnitudes, model.records, model.additions, additions, model.roughness
     by_fit = screen(*given, model.fit)
-    by_motion = [] if model.white else screen(*given)
     short, long = THRESHOLDS.shortlist, THRESHOLDS.long_list
-    worth = [one for one in by_fit if one.gain > THRESHOLDS.worth_fitting]
     search = _Search(magnitudes, model, by_fit)
+    search.go_on_from([one for one in in_other_noise if one.fit][:short])
+    if not anew:
+        return search.ranking()
+    by_motion = [] if model.white else screen(*given)
+    worth = [one for one in by_fit if one.gain > THRESHOLDS.worth_fitting]
     search.from_motion(shortlist(by_motion, short))
     search.from_model(shortlist(worth, short))
-    search.go_on_from([one for one in in_other_noise if one.fit][:short])
     if thorough and model.residuals.mean_square < THRESHOLDS.near_floor:
         # such an error bends the motion that all curves are fitted to: no linearisation tells what it would gain
         bend = [a for a in additions if _bends_driven_motion(magnitudes, a)]
@@ -80,7 +82,7 @@ def fit_candidates(
         for harder in (*with_care, *more_of_them):
             if out_of_time() or search.reached_the_floor():
                 break
-            if search.out_of_reach() and (harder in more_of_them or search.explains_most()):
+            if search.out_of_reach() and (harder in more_of_them or earlier or search.explains_most()):
                 break
             harder()
     return search.ranking()

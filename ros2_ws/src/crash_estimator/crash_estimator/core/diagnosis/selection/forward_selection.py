@@ -48,7 +48,8 @@ def _one_by_one(
     """The best candidate is added as long as there is one; path: the steps that have led to the model, first: the next
     one in the sensors' noise, where it is known."""
     while not (path and out_of_time()):
-        done = weighed(magnitudes, effects, first or in_recorded_noise(magnitudes, effects, model, path))
+        fitted = not _as_many_as_believed(model, present)
+        done = weighed(magnitudes, effects, first or in_recorded_noise(magnitudes, effects, model, path, fitted))
         first = None
         path.append(done)
         fair = _without(model, done.best) if done.best and done.before is model else model
@@ -67,6 +68,12 @@ def _one_by_one(
                 return path, done.before
         model = larger
     return path, model
+
+
+def _as_many_as_believed(model: Model, present: int) -> bool:
+    """Whether a further addition would neither be believed beside those found nor leave noise."""
+    far_from_noise = model.residuals.mean_square >= THRESHOLDS.real_structure
+    return far_from_noise and len(model.additions) - present >= THRESHOLDS.most_at_once
 
 
 def _without(model: Model, found: CandidateFit) -> Model:

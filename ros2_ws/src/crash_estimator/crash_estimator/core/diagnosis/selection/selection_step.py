@@ -41,11 +41,12 @@ class SelectionStep(NamedTuple):
 
 
 def in_recorded_noise(
-    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: Sequence[SelectionStep] = ()
-) -> SelectionStep:
-    """All candidates against the sensors' noise; path: the steps before."""
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: Sequence[SelectionStep] = (),
+    fitted: bool = True,
+) -> SelectionStep:  # fmt: skip
+    """All candidates against the sensors' noise; path: the steps before; fitted: not only screened."""
     earlier = [one for step in path for one in step.candidates]
-    found = fit_candidates(magnitudes, effects, model, thorough=True, earlier=earlier)
+    found = fit_candidates(magnitudes, effects, model, thorough=True, earlier=earlier, anew=fitted)
     return SelectionStep(model, found, found)
 
 
@@ -54,7 +55,8 @@ def weighed(magnitudes: Magnitudes, effects: Mapping[str, Effect], done: Selecti
     model, found = done.before, done.candidates
     if done.leaves_noise:
         return done
-    for _ in range(THRESHOLDS.inflations):
+    fitted = any(one.fit for one in found)
+    for turn in range(THRESHOLDS.inflations):
         if out_of_time():
             break
         noisier = _noise_left_by(done, model.records)
@@ -66,7 +68,9 @@ def weighed(magnitudes: Magnitudes, effects: Mapping[str, Effect], done: Selecti
         if before.white:  # so it looks; the sensors' own noise decides
             decided = analyse(fit(model.fit.problem, before.fit.point), sharply=True).band_test
             before = before._replace(residuals=before.residuals._replace(band_test=decided))
-        done = SelectionStep(before, fit_candidates(magnitudes, effects, before, in_other_noise=found), found)
+        # the noise hardly changes after the first time: the fits in it only have to be gone on from
+        others = fit_candidates(magnitudes, effects, before, in_other_noise=done.candidates, anew=fitted and turn == 0)
+        done = SelectionStep(before, others, found)
     return done
 
 
