@@ -4,6 +4,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from ...effects.effect import Addition, Effect
 from ..output_error.continuation import (
     FROM_MEASURED_MOTION,
@@ -37,18 +39,20 @@ class CandidateFit(NamedTuple):
 def fit_candidates(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, thorough: bool = False,
     in_other_noise: Sequence[CandidateFit] = (), earlier: Sequence[CandidateFit] = (), anew: bool = True,
+    least: float = np.inf,
 ) -> list[CandidateFit]:  # fmt: skip
     """All candidates, best first; one for each effect and target.
 
     thorough: try more of them, and harder, where none of the most likely ones leaves white noise. in_other_noise: what
     was found with other noise, best first; its best fits are gone on from, and without `anew` nothing else is fitted.
-    earlier: what was found for the models before this one.
+    earlier: what was found for the models before this one. least: cost that another explanation leaves; what stays far
+    above it is not fitted to the end.
     """
     additions = candidates(magnitudes, effects, model.additions)
     given = magnitudes, model.records, model.additions, additions, model.roughness
     by_fit = screen(*given, model.fit)
     short, long = THRESHOLDS.shortlist, THRESHOLDS.long_list
-    search = _Search(magnitudes, model, by_fit)
+    search = _Search(magnitudes, model, by_fit, least)
     search.go_on_from([one for one in in_other_noise if one.fit][:short])
     if not anew:
         return search.ranking()
@@ -91,9 +95,9 @@ def fit_candidates(
 class _Search:
     """The best fit of each effect and target so far."""
 
-    def __init__(self, magnitudes: Magnitudes, model: Model, screened: Sequence[Screened]):
+    def __init__(self, magnitudes: Magnitudes, model: Model, screened: Sequence[Screened], least: float):
         self.magnitudes, self.model, self.screened = magnitudes, model, screened
-        self.least = model.fit.cost
+        self.least = min(model.fit.cost, least)
         self.done: set[tuple[int, Schedule]] = set()
         self.found: dict[tuple[str, str], CandidateFit] = {}
         for one in screened:

@@ -9,8 +9,9 @@ from ...structure import Structure
 from ..observation.record import ObservedRecord
 from ..parameterization.magnitudes import measure_magnitudes
 from .assumptions import SelectionPath, first_believed, select
+from .candidate_fits import fit_candidates
 from .fitted_model import fit_model
-from .selection_step import in_recorded_noise
+from .selection_step import SelectionStep
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
 
@@ -45,12 +46,13 @@ def select_common_first(
 
 def _one_leaves_noise(rare: Mapping[str, Effect], found: SelectionPath) -> bool:
     """Whether one of them does, alone or beside what was found first, where without it there is more."""
-    magnitudes = measure_magnitudes(found.structure, found.records, found.cells)
+    magnitudes, enough = measure_magnitudes(found.structure, found.records, found.cells), found.noise
     for count in (found.present, found.present + 1):
         model = fit_model(magnitudes, found.records, found.final.additions[:count])
         if model.white or out_of_time():
             return False
-        if in_recorded_noise(magnitudes, rare, model).leaves_noise:
+        candidates = fit_candidates(magnitudes, rare, model, thorough=not enough, least=found.as_recorded.cost)
+        if SelectionStep(model, candidates).leaves_noise:
             return True
     return False
 
