@@ -1,4 +1,5 @@
-"""Rare effects bend far: they are looked for after the common ones, and believed only where they leave noise."""
+"""Rare effects bend far: they are looked for after the common ones, and believed only where one of them alone leaves
+noise."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -31,7 +32,7 @@ def select_common_first(
     as likely: then both stand in one ranking.
 
     enough: whether what the common ones leave is good enough, so that none is looked for beside them. Whether a rare
-    one leaves noise is asked of it alone, and beside what was found first; only then is it set against all the others.
+    one leaves noise, alone, is asked first; only then is it set against all the others.
     """
     common = common_effects(structure, effects)
     found = first_believed(select(structure, records, common))
@@ -45,22 +46,23 @@ def select_common_first(
 
 
 def _one_leaves_noise(rare: Mapping[str, Effect], found: SelectionPath) -> bool:
-    """Whether one of them does, alone or beside what was found first, where without it there is more."""
-    magnitudes, enough = measure_magnitudes(found.structure, found.records, found.cells), found.noise
-    for count in (found.present, found.present + 1):
-        model = fit_model(magnitudes, found.records, found.final.additions[:count])
-        if model.white or out_of_time():
-            return False
-        candidates = fit_candidates(magnitudes, rare, model, thorough=not enough, least=found.as_recorded.cost)
-        if SelectionStep(model, candidates).leaves_noise:
-            return True
-    return False
+    """Whether one of them does, alone. It is fitted with care where it leaves less than what was found."""
+    magnitudes, other = measure_magnitudes(found.structure, found.records, found.cells), found.as_recorded.cost
+    model = fit_model(magnitudes, found.records, found.final.additions[: found.present])
+    if model.white or out_of_time():
+        return False
+    fits = fit_candidates(magnitudes, rare, model, least=other)
+    step = SelectionStep(model, fits)
+    if not step.leaves_noise and any(one.fit and one.fit.cost < other for one in fits):
+        step = SelectionStep(model, fit_candidates(magnitudes, rare, model, thorough=True, least=other))
+    return step.leaves_noise
 
 
 def _is_as_good(path: SelectionPath, found: SelectionPath) -> bool:
-    """It leaves noise in the whole band, as the other does not, or is not less likely beyond doubt."""
+    """One effect alone leaves noise in the whole band, as the other path does not, or is not less likely beyond doubt.
+    A rare one with another beside it would follow most that no vocabulary has."""
     as_likely = path.as_recorded.evidence > found.as_recorded.evidence - THRESHOLDS.confounded
-    return _leaves_noise(path) and (as_likely or not _leaves_noise(found))
+    return len(path.added) == 1 and _leaves_noise(path) and (as_likely or not _leaves_noise(found))
 
 
 def _leaves_noise(path: SelectionPath) -> bool:
