@@ -38,34 +38,34 @@ class CandidateFit(NamedTuple):
 
 def fit_candidates(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, thorough: bool = False,
-    in_other_noise: Sequence[CandidateFit] = (), earlier: Sequence[CandidateFit] = (), anew: bool = True,
+    in_other_noise: Sequence[CandidateFit] = (), earlier: Sequence[CandidateFit] = (), fitted: bool = True,
     least: float = np.inf,
 ) -> list[CandidateFit]:  # fmt: skip
     """All candidates, best first; one for each effect and target.
 
     thorough: try more of them, and harder, where none of the most likely ones leaves white noise. in_other_noise: what
-    was found with other noise, best first; its best fits are gone on from, and without `anew` nothing else is fitted.
-    earlier: what was found for the models before this one. least: cost that another explanation leaves; what stays far
-    above it is not fitted to the end.
+    was found with other noise, best first; its best fits are gone on from. earlier: what was found for the models
+    before this one. fitted: not only screened. least: cost that another explanation leaves; what stays far above it is
+    not fitted to the end.
     """
     additions = candidates(magnitudes, effects, model.additions)
     given = magnitudes, model.records, model.additions, additions, model.roughness
     by_fit = screen(*given, model.fit)
     short, long = THRESHOLDS.shortlist, THRESHOLDS.long_list
     search = _Search(magnitudes, model, by_fit, least)
-    search.go_on_from([one for one in in_other_noise if one.fit][:short])
-    if not anew:
+    if not fitted:
         return search.ranking()
     by_motion = [] if model.white else screen(*given)
     worth = [one for one in by_fit if one.gain > THRESHOLDS.worth_fitting]
     search.from_motion(shortlist(by_motion, short))
     search.from_model(shortlist(worth, short))
+    search.go_on_from([one for one in in_other_noise if one.fit][:short])
     if thorough and model.residuals.mean_square < THRESHOLDS.near_floor:
         # such an error bends the motion that all curves are fitted to: no linearisation tells what it would gain
         bend = [a for a in additions if _bends_driven_motion(magnitudes, a)]
         if model.white:  # to stand for what was added, one would have had to explain all alone
-            fitted = {one.addition.key for one in earlier if one.fit}
-            bend = [a for a in bend if a.key not in fitted]
+            tried = {one.addition.key for one in earlier if one.fit}
+            bend = [a for a in bend if a.key not in tried]
         search.from_motion(Screened(a, 0.0, 0.0, 1.0) for a in bend)
     if thorough and not model.white:
         gridded = [a for a in additions if a.effect.coefficient_grid()]

@@ -46,7 +46,7 @@ def in_recorded_noise(
 ) -> SelectionStep:  # fmt: skip
     """All candidates against the sensors' noise; path: the steps before; fitted: not only screened."""
     earlier = [one for step in path for one in step.candidates]
-    found = fit_candidates(magnitudes, effects, model, thorough=True, earlier=earlier, anew=fitted)
+    found = fit_candidates(magnitudes, effects, model, thorough=True, earlier=earlier, fitted=fitted)
     return SelectionStep(model, found, found)
 
 
@@ -56,7 +56,7 @@ def weighed(magnitudes: Magnitudes, effects: Mapping[str, Effect], done: Selecti
     if done.leaves_noise:
         return done
     fitted = any(one.fit for one in found)
-    for turn in range(THRESHOLDS.inflations):
+    for _ in range(THRESHOLDS.inflations):
         if out_of_time():
             break
         noisier = _noise_left_by(done, model.records)
@@ -68,8 +68,7 @@ def weighed(magnitudes: Magnitudes, effects: Mapping[str, Effect], done: Selecti
         if before.white:  # so it looks; the sensors' own noise decides
             decided = analyse(fit(model.fit.problem, before.fit.point), sharply=True).band_test
             before = before._replace(residuals=before.residuals._replace(band_test=decided))
-        # the noise hardly changes after the first time: the fits in it only have to be gone on from
-        others = fit_candidates(magnitudes, effects, before, in_other_noise=done.candidates, anew=fitted and turn == 0)
+        others = fit_candidates(magnitudes, effects, before, in_other_noise=found, fitted=fitted)
         done = SelectionStep(before, others, found)
     return done
 
