@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import coverage
 from mutant_runs import (
+    AMID_OTHERS,
     KEPT,
     PACKAGES,
     ROOT,
@@ -95,7 +96,7 @@ def learn(file: str, plain: bool) -> dict:
         lines.stop()
         watch.learnt()
 
-    return forked(plain, 2.0 * SLOW_FILE + 10.0, work) or {}
+    return forked(plain, AMID_OTHERS * (2.0 * SLOW_FILE + 10.0), work) or {}
 
 
 def failed(
@@ -181,7 +182,7 @@ def is_plain(path: Path, line: int) -> bool:
 
 def caught_by(path: Path, line: int, after: str, known: dict[bool, dict[str, Test]]) -> str:
     """The test that fails when a line reads differently, or nothing."""
-    plain, end = is_plain(path, line), time.monotonic() + PATIENCE
+    plain, end = is_plain(path, line), time.monotonic() + AMID_OTHERS * PATIENCE
     tests = known[plain]
     order, lines = judges(path, line, tests), (SOURCES / path).read_text().splitlines()
     text = "\n".join([*lines[: line - 1], after, *lines[line:]]) + "\n"

@@ -32,7 +32,7 @@ def test_each_changes_one_line_into_code_that_can_be_read():
         ("x = a + b", "x = a - b"),
         ("y = a < b", "y = a >= b"),
         ("y = a < 3", "y = a <= 3"),
-        ("LIMIT = 1.96", "LIMIT = 2.45"),
+        ("def limit():\n    return 1.96", "    return 2.45"),
         ("z = a and b", "z = a or b"),
         ("flag = True", "flag = False"),
     ],
@@ -41,6 +41,26 @@ def test_what_is_changed_into_what(tmp_path, before, after, monkeypatch):
     monkeypatch.setattr(mutants, "SOURCES", tmp_path)
     (tmp_path / "one.py").write_text(before + "\n")
     assert after in [mutant.after for mutant in mutants.mutants_of("core", tmp_path / "one.py")]
+
+
+@pytest.mark.parametrize(
+    ("line", "drawn"),
+    [
+        ("SHARE = 0.3", False),
+        ("EDGES = (0.0, 60.0)", False),
+        ("STAGES = (Stage(1.0, ramp=6.0),)", False),
+        ("PER_RECORD = (512 - 4) // 4", True),  # calculated
+        ("ROBUST = True", True),  # no number
+        ("def f(x):\n    return 0.3 * x", True),
+    ],
+)
+def test_a_number_that_was_chosen_is_no_mistake_in_logic(tmp_path, line, drawn, monkeypatch):
+    monkeypatch.setattr(mutants, "SOURCES", tmp_path)
+    for name, always in (("one.py", False), ("readers/units.py", True)):
+        file = tmp_path / name
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(line + "\n")
+        assert bool(mutants.mutants_of("core", file)) == (drawn or always)
 
 
 def test_messages_and_docstrings_are_left_alone(tmp_path, monkeypatch):
