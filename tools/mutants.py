@@ -190,8 +190,8 @@ PAGE = """\
 # What share of one-line mistakes the tests catch
 
 Made by `make mutants`: one operator, condition or number changed. The tests that execute the line judge, quickest
-first, for {patience:g} s of a processor at most, but for those that take {slow:g} s of it or more and for what they do in
-other processes (`tools/mutant_judges.py`). What numba compiles is judged as Python.
+first, for {patience:g} s of a processor at most, but for those that take {slow:g} s of it or more and for what they do
+in other processes (`tools/mutant_judges.py`). What numba compiles is judged as Python.
 
 Not drawn: numbers that stand by themselves in a constant of a module or as the default of a class's field, unless they
 are facts of a unit, a format, a standard or of physics (`FACTS` of `tools/mutants.py`). Such a number was chosen, and
