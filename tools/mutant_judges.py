@@ -177,7 +177,21 @@ def _compiled() -> tuple[set[Path], set[Path]]:
 def is_plain(path: Path, line: int) -> bool:
     """Whether a line is judged as Python: numba compiles it, or takes it as a constant from where it stands."""
     compiled, beside = _compiled()
-    return path in compiled or (path in beside and _place(path, line)[1] is not None)
+    if path in compiled | beside and _place(path, line)[1] is not None:
+        return True
+    return path in compiled and _is_compiled(path, line)
+
+
+@cache
+def _is_compiled(path: Path, line: int) -> bool:
+    """Whether a line of a file is one of a function that numba compiles."""
+    functions = (n for n in ast.walk(ast.parse((SOURCES / path).read_text())) if isinstance(n, ast.FunctionDef))
+    return any(line in _extent(n) and "njit" in map(_called, n.decorator_list) for n in functions)
+
+
+def _called(decorator: ast.expr) -> str:
+    """The name of a decorator."""
+    return getattr(getattr(decorator, "func", decorator), "id", "")
 
 
 def caught_by(path: Path, line: int, after: str, known: dict[bool, dict[str, Test]]) -> str:

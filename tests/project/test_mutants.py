@@ -2,6 +2,7 @@
 
 import ast
 import sys
+from pathlib import Path
 
 import pytest
 from helpers_paths import PACKAGES, ROOT
@@ -126,3 +127,14 @@ def test_the_page_keeps_what_other_seeds_gave():
     both = mutants.page(of_two, mutants.page(of_one, ""))
     assert "0 of 1 caught, 0%" in both and "1 of 1 caught, 100%" in both and both.index("Seed 1") < both.index("Seed 2")
     assert mutants.page(of_one, both) == both
+
+
+def test_only_what_numba_compiles_is_judged_as_python(tmp_path, monkeypatch):
+    monkeypatch.setattr(mutant_judges, "SOURCES", tmp_path)
+    path = Path("one.py")
+    compiled = "@njit(cache=True)\ndef f(x):\n    return x\n\n\n"
+    (tmp_path / path).write_text(f"LIMIT = 3\n\n\n\n{compiled}def g(x):\n    return f(x)\n")
+    monkeypatch.setattr(mutant_judges, "_compiled", lambda: ({path}, set()))
+    assert [mutant_judges.is_plain(path, line) for line in (1, 7, 11)] == [True, True, False]
+    mutant_judges._place.cache_clear()
+    mutant_judges._is_compiled.cache_clear()
