@@ -169,3 +169,30 @@ def test_the_setting_says_whether_anything_is_added_to_the_sigma(method, more):
             state, _ = estimator.step(state, sample)
         told[counted] = np.diagonal(state.update.stated) / np.diagonal(state.update.covariance)
     assert (told[False] == 1.0).all() and (told[True] > 0.0).all() and (np.abs(told[True] - 1.0) > 1e-6).any()
+
+
+@pytest.mark.parametrize("method", ["rls", "mrls", "kalman", "constrained_kalman", "gauss_newton", "afmm"])
+def test_a_recursion_as_printed_states_what_it_knows_itself(method):
+    """Nothing is added of the integrated motion, whose errors the thesis does not have."""
+    recording = oscillating()
+    estimator = spring_estimator(recording, method, preset="thesis")
+    state = estimator.init()
+    for sample in recording.samples():
+        state, _ = estimator.step(state, sample)
+    assert_array_equal(state.update.stated, state.update.covariance)
+
+
+def test_where_no_noise_is_known_the_printed_mrls_takes_one_unit():
+    """As if that had been stated: for the limit of its mean error as well."""
+    recording = oscillating()
+    recording = Recording(recording.test, recording.time_ns[20:], recording.values[20:])  # no rest to know it from
+    bodies = {noise: Body("car", 1.0, ("a",), noise=noise) for noise in (None, 1.0)}
+    law = [Coefficient(value, estimated=True, std=0.5 * value) for value in (800.0, 1.0)]
+    found = {}
+    for noise, body in bodies.items():
+        structure = Structure("one", (body, Body("wall", fixed=True)), (Element("spring", ("car", "wall"), *law),))
+        estimator = make_estimator(structure, recording.test, "mrls", preset="thesis", m=4, rewinds=3)
+        found[noise] = run(estimator, recording.samples())
+    assert any(event.kind == "rewound" for e in found[1.0] for event in e.events)
+    for one, other in zip(found[None], found[1.0], strict=True):
+        assert_array_equal(one.parameters, other.parameters)
