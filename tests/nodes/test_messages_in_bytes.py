@@ -1,5 +1,7 @@
 """Messages read from their bytes are those that rclpy makes of them, wherever the lengths before put each field."""
 
+import struct
+
 import numpy as np
 import pytest
 from crash_msgs.msg import Forces, ParametersBlock, ResidualsBlock, Samples
@@ -34,6 +36,18 @@ def test_samples(frame, samples):
     if samples:
         rows = rows_of(found)
         assert rows.number == 1234 and rows.values.shape == (samples, 2)
+
+
+def test_samples_from_a_machine_of_the_other_byte_order():
+    """As CDR has them there: the same fields at the same places, most significant byte first."""
+    body = struct.pack(">iI", 7, 250) + struct.pack(">I", 2) + b"a\0\0\0" + struct.pack(">I", 3)
+    body += b"\0" * (-len(body) % 8) + struct.pack(">Q", 1234)
+    for code, values in (("q", (5, 6)), ("d", (1.5, -2.5))):
+        body += struct.pack(">I", 2)
+        body += b"\0" * (-len(body) % 8) + struct.pack(f">2{code}", *values)
+    found = received(b"\0\0\0\0" + body)
+    assert (found.run, found.number, found.stamp_ns) == (3, 1234, 7_000_000_250)
+    assert found.time_ns.tolist() == [5, 6] and found.values.tolist() == [1.5, -2.5]
 
 
 def test_bytes_that_end_too_early_are_no_samples():
