@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from crash_estimator.core.diagnosis.mechanics.driven_motion import driven_by, driven_motion
 from crash_estimator.core.diagnosis.mechanics.masses import attached_inertia
 from crash_estimator.core.diagnosis.observation.grid import DRIVEN_MODES, cosines_of
+from crash_estimator.core.diagnosis.observation.trajectory import element_motion
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.effects.effect import Addition
 from crash_replay.conditioning import cfc_filter
@@ -69,3 +70,13 @@ def test_an_attached_body_pushes_without_its_ringing_where_noise_stands_for_that
     record = SimpleNamespace(dt=np.full(len(TIME), step), noise_is_inflated=inflated)
     inertia = attached_inertia(SimpleNamespace(attached={"box": 1}), record, SimpleNamespace(a=a))
     assert_allclose(inertia("box"), cfc_filter(a[:, 1], step, 60) if filtered else a[:, 1])
+
+
+def test_an_element_is_crushed_by_what_its_first_end_goes_towards_its_second():
+    x = np.column_stack([0.3 * np.sin(40.0 * TIME), 0.1 * np.sin(40.0 * TIME)])
+    v = np.gradient(x, TIME, axis=0)
+    structure = SimpleNamespace(ends=np.array([[0, 1]]), elements=[SimpleNamespace(displacement="")])
+    found = element_motion(structure, SimpleNamespace(time=TIME), SimpleNamespace(x=x, v=v), 0)
+    assert_allclose(found.crush, 0.2 * np.sin(40.0 * TIME), atol=1e-15)
+    assert_allclose(found.rate, v[:, 0] - v[:, 1])
+    assert_allclose(found.peak, np.maximum.accumulate(found.crush))
