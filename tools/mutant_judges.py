@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import coverage
 from mutant_runs import (
+    AMID_OTHERS,
     KEPT,
     PACKAGES,
     ROOT,
@@ -95,7 +96,7 @@ def learn(file: str, plain: bool) -> dict:
         lines.stop()
         watch.learnt()
 
-    return forked(plain, 2.0 * SLOW_FILE + 10.0, work) or {}
+    return forked(plain, AMID_OTHERS * (2.0 * SLOW_FILE + 10.0), work) or {}
 
 
 def failed(
@@ -176,12 +177,26 @@ def _compiled() -> tuple[set[Path], set[Path]]:
 def is_plain(path: Path, line: int) -> bool:
     """Whether a line is judged as Python: numba compiles it, or takes it as a constant from where it stands."""
     compiled, beside = _compiled()
-    return path in compiled or (path in beside and _place(path, line)[1] is not None)
+    if path in compiled | beside and _place(path, line)[1] is not None:
+        return True
+    return path in compiled and _is_compiled(path, line)
+
+
+@cache
+def _is_compiled(path: Path, line: int) -> bool:
+    """Whether a line of a file is one of a function that numba compiles."""
+    functions = (n for n in ast.walk(ast.parse((SOURCES / path).read_text())) if isinstance(n, ast.FunctionDef))
+    return any(line in _extent(n) and "njit" in map(_called, n.decorator_list) for n in functions)
+
+
+def _called(decorator: ast.expr) -> str:
+    """The name of a decorator."""
+    return getattr(getattr(decorator, "func", decorator), "id", "")
 
 
 def caught_by(path: Path, line: int, after: str, known: dict[bool, dict[str, Test]]) -> str:
     """The test that fails when a line reads differently, or nothing."""
-    plain, end = is_plain(path, line), time.monotonic() + PATIENCE
+    plain, end = is_plain(path, line), time.monotonic() + AMID_OTHERS * PATIENCE
     tests = known[plain]
     order, lines = judges(path, line, tests), (SOURCES / path).read_text().splitlines()
     text = "\n".join([*lines[: line - 1], after, *lines[line:]]) + "\n"

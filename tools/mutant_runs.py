@@ -26,7 +26,9 @@ ROOT = Path(__file__).resolve().parent.parent
 SOURCES, KEPT = ROOT / "ros2_ws" / "src", ROOT / "out" / "mutants"
 PACKAGES = ("crash_estimator", "crash_replay")
 AT_ONCE = 2  # processes that judge
-SLOW, SLOW_FILE = 6.0, 15.0  # s: a test that takes longer judges nothing, nor one that is begun so late in its file
+SLOW, SLOW_FILE = 6.0, 20.0  # s: a test that takes longer judges nothing, nor one that is begun so late in its file
+AMID_OTHERS = 3.0
+"""So many times what it takes of a processor may a test last, and its judging: others use the processors too."""
 BEFORE = "scipy.signal scipy.optimize scipy.linalg scipy.stats hypothesis yaml pydantic rclpy.node crash_msgs.msg"
 """What takes long to import, and is not changed."""
 
@@ -39,7 +41,7 @@ class Watch:
     """What pytest tells of a run: which test executes which lines and how long it takes, and which fails."""
 
     def __init__(self, note: Path, limits: dict[str, float] | None = None, lines: coverage.Coverage | None = None):
-        self.note, self.limits, self.lines, self.end = note, limits, lines, time.monotonic() + SLOW_FILE
+        self.note, self.limits, self.lines, self.end = note, limits, lines, time.process_time() + SLOW_FILE
         self.took, self.shared, self.bad = Counter(), {}, []
 
     @pytest.hookimpl(trylast=True)
@@ -50,14 +52,17 @@ class Watch:
 
     @pytest.hookimpl(hookwrapper=True)
     def pytest_runtest_protocol(self, item):
-        if self.limits is None and time.monotonic() > self.end:
+        if self.limits is None and time.process_time() > self.end:
             item.session.shouldstop = "it takes too long to judge"
         self.shared[item.nodeid] = [f"{file_of(item.nodeid)} {name}" for name in item.fixturenames]
         self._count(item.nodeid)
         signal.signal(signal.SIGALRM, lambda *_: pytest.fail("too slow"))
-        signal.setitimer(signal.ITIMER_REAL, (self.limits or {}).get(item.nodeid, SLOW))
+        signal.setitimer(signal.ITIMER_REAL, (self.limits or {}).get(item.nodeid, AMID_OTHERS * SLOW))
+        start = time.monotonic(), time.process_time()
         yield
         signal.setitimer(signal.ITIMER_REAL, 0.0)
+        lasted, used = time.monotonic() - start[0], time.process_time() - start[1]
+        self.took[item.nodeid] = max(used, lasted / AMID_OTHERS)  # one that waits uses no processor
 
     @pytest.hookimpl(hookwrapper=True)
     def pytest_fixture_setup(self, fixturedef, request):
@@ -71,7 +76,6 @@ class Watch:
             self.lines.switch_context(context)
 
     def pytest_runtest_logreport(self, report):
-        self.took[report.nodeid] += report.duration
         if report.failed:
             self._failed(report.nodeid)
 
@@ -92,7 +96,7 @@ class Watch:
                 for context in contexts:
                     bits[context][str(Path(path).relative_to(SOURCES))] |= 1 << line
         tests = {}
-        for test in self.took.keys() - set(self.bad):
+        for test in (test for test in self.took.keys() - set(self.bad) if self.took[test] < SLOW):
             lines = Counter(bits[test])
             for shared in self.shared[test]:
                 for path, more in bits[shared].items():

@@ -17,10 +17,12 @@ import random
 import re
 import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import mutant_judges
+import mutant_runs
 from mutant_runs import KEPT, PACKAGES, ROOT, SLOW, SOURCES, shared_out
 
 PARTS = {"core": (PACKAGES[0], 0.6), "readers": (PACKAGES[1], 0.25), "nodes": (PACKAGES[0], 0.15)}
@@ -32,11 +34,21 @@ SIGNS = {ast.Add: "+ -", ast.Sub: "- +", ast.Mult: "* /", ast.Div: "/ *", ast.Po
          ast.GtE: ">= <"}  # fmt: skip
 BOUNDARY = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
 """Beside a whole number: there it is another one; of two measurements it hardly ever is."""
-SILENT = re.compile(r"raise |Error\(|say\(|\.info\(|\.warn|help=|f\"|import |@|Allowed\(|TYPE_CHECKING")
-"""Lines of messages, declarations and imports: a changed one is no wrong result."""
+SILENT = re.compile(
+    r"raise |Error\(|say\(|\.info\(|\.warn|help=|f\"|import |@|Allowed\(|TYPE_CHECKING|strict=|frozen=|__name__"
+)
+"""Lines of messages, declarations, imports and guards for the programmer: a changed one is no wrong result."""
+FACTS = re.compile(r"readers/(units|dates|nhtsa_uds|codes/\w+)\.py|core/(rating|validation|effects/vented_gas)\.py")
+"""Files whose constants are facts of a unit, a format, a standard or of physics; those of others were chosen."""
 
-EQUAL = {"strict=False": "the lengths are alike, and are checked no more"}
-"""What a mutant may have that its line has not, and why it provably changes nothing; it counts as not caught."""
+EQUAL = {
+    "names.sign / (-1.0": "by 1 or -1 it is all the same",
+    "sign <= 0": "a sign is 1 or -1",
+    "else at - 4": "there stands the upper half of the first sample's number, which is 0: no test has 2^32",
+    "reshape(n, -2)": "numpy takes every number below 0 for the open one",
+    "self.run > 0 else 0": "of run 0 it is 0 either way",
+}
+"""What a mutant has that its line has not, and why it provably changes nothing; it counts as not caught."""
 
 
 class Mutant(NamedTuple):
@@ -52,13 +64,33 @@ def mutants_of(part: str, path: Path) -> list[Mutant]:
     """Every one-line change of a file."""
     nodes, lines, found = list(ast.walk(ast.parse(path.read_text()))), path.read_text().splitlines(), []
     told = {n for node in nodes if isinstance(node, ast.Raise) for n in range(node.lineno, node.end_lineno + 1)}
-    for node in nodes:
+    settings = set() if FACTS.search(str(path)) else _settings(nodes)
+    for node in (node for node in nodes if node not in settings):
         for line, start, stop, new, kind in _changes(node, lines):
             before = lines[line - 1]
             if line not in told and before.isascii() and not SILENT.search(before):  # columns count bytes
                 after = before[:start] + new + before[stop:]
                 found.append(Mutant(part, path.relative_to(SOURCES), line, kind, before, after))
     return found
+
+
+def _settings(nodes: list[ast.AST]) -> set[ast.AST]:
+    """Numbers that stand by themselves in a constant of a module or as the default of a class's field."""
+    found = set()
+    for node in nodes:
+        if isinstance(node, ast.Module | ast.ClassDef):
+            given = [n for n in node.body if isinstance(n, ast.Assign | ast.AnnAssign) and n.value]
+            found |= {leaf for n in given for leaf in _alone(n.value) if type(leaf.value) is not bool}
+    return found
+
+
+def _alone(node: ast.AST) -> Iterator[ast.Constant]:
+    """The constants of an expression that nothing is calculated or compared with."""
+    if isinstance(node, ast.Constant):
+        yield node
+    elif not isinstance(node, ast.BinOp | ast.Compare | ast.BoolOp | ast.Lambda):
+        for inner in ast.iter_child_nodes(node):
+            yield from _alone(inner)
 
 
 def _changes(node: ast.AST, lines: list[str]) -> list[tuple[int, int, int, str, str]]:
@@ -164,8 +196,15 @@ PAGE = """\
 # What share of one-line mistakes the tests catch
 
 Made by `make mutants`: one operator, condition or number changed. The tests that execute the line judge, quickest
-first, for {patience:g} s at most, but for those that take {slow:g} s or more and for what they do in other processes
-(`tools/mutant_judges.py`). What numba compiles is judged as Python.
+first, for {patience:g} s of a processor at most, but for those that take {slow:g} s of it or more and for what they do
+in other processes (`tools/mutant_judges.py`). What numba compiles is judged as Python.
+
+Not drawn: numbers that stand by themselves in a constant of a module or as the default of a class's field, unless they
+are facts of a unit, a format, a standard or of physics (`FACTS` of `tools/mutants.py`). Such a number was chosen, and
+its reason stands beside it: a quarter more of it is another choice, no mistake in logic, and a test that finds it would
+say the number again. Numbers in equations, conditions, places and steps are drawn. Nor are lines drawn of messages and
+declarations, and guards that change no result (`strict=`, `frozen=`, `__name__`).
+
 What is not caught stays so until it is judged again (`--again`), though a test was written for it since.
 """
 SECTION = """\
@@ -190,7 +229,9 @@ def main() -> None:
     parser.add_argument("--only", default="", help="part of a path, such as core/estimators")
     parser.add_argument("--minutes", type=float, default=60.0, help="no new one is begun after them")
     parser.add_argument("--again", action="store_true", help="judge those that the last run of this seed did not catch")
+    parser.add_argument("--at-once", type=int, default=mutant_runs.AT_ONCE, help="processes that judge")
     given = parser.parse_args()
+    mutant_runs.AT_ONCE = given.at_once
     mutants, kept = drawn(given.mutants, given.seed, given.only), KEPT / f"seed{given.seed}.json"
     before = dict(json.loads(kept.read_text())) if given.again else {}
     asked = [mutant for mutant in mutants if not before.get(_name(mutant))]

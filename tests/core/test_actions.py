@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from crash_estimator.core.actions import Actions
+from crash_estimator.core.kinematics import Motion
 
 THETA = np.array([3.0, -2.0, 0.1])
 KNOWN, GRADIENT = np.array([5.0, 7.0]), np.array([[1.0, 0.5, 0.0], [0.3, 2.0, 0.0]])
@@ -36,3 +37,46 @@ def test_an_error_of_a_channel_is_in_what_is_predicted_of_it(kind, share):
     assert_allclose(gradient[1], slopes, rtol=1e-9)
     assert factor[1] == pytest.approx(1.0 + share * THETA[2] if kind == "gain" else 1.0)
     assert (known[0], *gradient[0]) == (KNOWN[0], *GRADIENT[0]), "the other equation is as it was"
+
+
+def corrected(kind: str, share: float, error: float, time: float, motion: Motion, start) -> Motion:
+    """Of two bodies and the element between them; the first one's channel errs."""
+    actions = SimpleNamespace(
+        actions=[SimpleNamespace(kind=kind, share=share, at=0)], of_channels=[0], first=1, mass=[10.0, 20.0],
+        moves=[True, True], measured_crush=np.array([False]), ends=np.array([[0, 1]]),
+    )  # fmt: skip
+    return Actions.corrected(actions, motion._replace(time=time), np.array([1e5, error]), start)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.4])
+@pytest.mark.parametrize("kind", ["gain", "offset"])
+def test_the_motion_without_a_channel_s_error_is_integrated_from_what_it_should_have_recorded(kind, share):
+    """A constant acceleration a from x0 with v0: x = x0 + v0 t + a t^2 / 2, and a is wrong by the error's share."""
+    time, recorded_a, error = 0.03, -400.0, 0.08 if kind == "gain" else 25.0
+    x0, v0 = np.array([0.2, 0.0]), np.array([13.0, 0.0])
+
+    def moved(a):
+        return x0 + v0 * time + 0.5 * a * time**2, v0 + a * time, a
+
+    def crush(x, v):
+        return x[[0]] - x[[1]], v[[0]] - v[[1]]
+
+    def motion_of(a):
+        x, v, a = moved(np.array([a, 0.0]))
+        return Motion(time, 1e-3, x, v, a, *crush(x, v), *np.zeros((3, 2)), np.zeros((2, 2)), np.zeros(2))
+
+    def true(error):
+        a = recorded_a / (1.0 + error) if kind == "gain" else recorded_a - error
+        return recorded_a + share * (a - recorded_a)
+
+    found = corrected(kind, share, error, time, motion_of(recorded_a), (x0, v0))
+    expected = motion_of(true(error))
+    for name in ("displacement", "velocity", "acceleration", "crush", "rate"):
+        assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-12, err_msg=name)
+    step = 1e-5 * error
+    ahead, behind = motion_of(true(error + step)), motion_of(true(error - step))
+    for of, by in (("displacement", found.displacement_by), ("velocity", found.velocity_by)):
+        slope = (getattr(ahead, of) - getattr(behind, of)) / (2.0 * step)
+        assert_allclose(by[:, 0], slope, rtol=1e-6, atol=1e-12)
+    before = motion_of(recorded_a)._replace(time=-0.01)
+    assert corrected(kind, share, error, -0.01, before, (x0, v0)).displacement is before.displacement

@@ -6,18 +6,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from crash_estimator.core.compiled.layout import row_fields, state_fields
-from crash_estimator.core.compiled.linear import invert
-from crash_estimator.core.compiled.plan import flat, make_method_plan
-from crash_estimator.core.compiled.views import (
-    RowViews,
-    StateViews,
-    method_of,
-    plan_views,
-    row_views,
-    size_of,
-    state_views,
-)
 from crash_estimator.core.estimate import Estimate
 from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
@@ -42,10 +30,6 @@ def disturbed(name) -> Recording:
     values = recording.values[keep].copy()
     values[700:710, 0] = np.nan  # a dropout on the way
     return Recording(recording.test, recording.time_ns[keep], values)
-
-
-def compiled_form(name, model, method):
-    return make_estimator(load_model(model), disturbed(name).test, method, compiled=True)
 
 
 @cache
@@ -86,42 +70,3 @@ def test_a_block_is_its_samples_one_by_one(method):
     rows = np.concatenate(rows)
     for field in ("parameters", "residual", "force", "std"):
         assert_array_equal(rows[:, estimator.columns[field]], [getattr(e, field) for e in single])
-
-
-def test_the_views_are_those_of_the_layout():
-    estimator = compiled_form("frontal_single", "frontal_single", "mrls")
-    for fields, make, views in (
-        (state_fields(estimator.size), state_views, StateViews),
-        (row_fields(estimator.size), row_views, RowViews),
-    ):
-        assert tuple(fields) == views._fields
-        flat = np.arange(sum(int(np.prod(shape)) for shape in fields.values()), dtype=float)
-        parts = make(flat, estimator.size)
-        assert [part.shape for part in parts] == list(fields.values())
-        assert_array_equal(np.concatenate([part.ravel() for part in parts]), flat)
-
-
-@pytest.mark.parametrize("method", ["mrls", "constrained_kalman"])
-def test_a_plan_comes_back_from_its_two_arrays(method):
-    estimator = compiled_form("frontal_engine_cab", "frontal_engine_cab", method)
-    settings = make_method_plan(estimator.method)
-    whole, others = flat(estimator.size, settings, estimator.plan)
-    assert size_of(whole) == estimator.size
-    assert_array_equal(method_of(others), settings)
-    for name, found, given in zip(
-        estimator.plan._fields, plan_views(whole, others, estimator.size), estimator.plan, strict=True
-    ):
-        assert_array_equal(found, given, err_msg=name)
-
-
-def test_the_kept_part_of_a_matrix_is_inverted_and_a_singular_one_gives_no_number():
-    rng = np.random.default_rng(0)
-    half = rng.standard_normal((5, 5)) * [1e5, 1.0, 1e-3, 10.0, 1.0]  # units as far apart as N/m and N s/m
-    matrix, keep, found = half.T @ half, np.array([1.0, 0.0, 1.0, 1.0, 1.0]), np.empty((5, 5))
-    invert(matrix, keep, found)
-    kept = np.flatnonzero(keep)
-    inner = np.ix_(kept, kept)
-    assert_allclose(found[inner] @ matrix[inner], np.eye(4), atol=1e-6)
-    assert not found[1].any() and not found[:, 1].any()
-    invert(np.zeros((5, 5)), keep, found)
-    assert not np.isfinite(found[inner]).any()

@@ -123,11 +123,11 @@ def test_what_is_integrated_before_contact_tells_nothing_of_a_stiffness(method):
     assert_allclose(estimate.parameters[k], 5.0e4, rtol=1e-12)  # afmm's is a mean of equal values
 
 
-def oscillating(seed=0):
+def oscillating(seed=0, noise=20.0):
     """A mass on a spring and a damper, 20 samples at rest before the impact; its crush is integrated from noise too."""
     rng, dt, at_rest = np.random.default_rng(seed), 1e-3, 20
     t = np.arange(-at_rest, 100) * dt
-    values = np.where(t < 0.0, 0.0, -300.0 * np.sin(30.0 * t)) + rng.normal(0.0, 20.0, len(t))
+    values = np.where(t < 0.0, 0.0, -300.0 * np.sin(30.0 * t)) + rng.normal(0.0, noise, len(t))
     test = Test("one", (Channel("a", "acceleration", "car"),), initial_velocity={"car": 10.0})
     return Recording(test, np.round(t * 1e9).astype(np.int64), values[:, None])
 
@@ -168,4 +168,32 @@ def test_the_setting_says_whether_anything_is_added_to_the_sigma(method, more):
         for sample in recording.samples():
             state, _ = estimator.step(state, sample)
         told[counted] = np.diagonal(state.update.stated) / np.diagonal(state.update.covariance)
-    assert (told[False] == 1.0).all() and (np.abs(told[True] - 1.0) > 1e-6).any()
+    assert (told[False] == 1.0).all() and (told[True] > 0.0).all() and (np.abs(told[True] - 1.0) > 1e-6).any()
+
+
+@pytest.mark.parametrize("method", ["rls", "mrls", "kalman", "constrained_kalman", "gauss_newton", "afmm"])
+def test_a_recursion_as_printed_states_what_it_knows_itself(method):
+    """Nothing is added of the integrated motion, whose errors the thesis does not have."""
+    recording = oscillating()
+    estimator = spring_estimator(recording, method, preset="thesis")
+    state = estimator.init()
+    for sample in recording.samples():
+        state, _ = estimator.step(state, sample)
+    assert_array_equal(state.update.stated, state.update.covariance)
+
+
+def test_where_no_noise_is_known_the_printed_mrls_takes_one_unit():
+    """As if that had been stated: for the limit of its mean error as well."""
+    recording = oscillating(noise=2.5)
+    recording = Recording(recording.test, recording.time_ns[20:], recording.values[20:])  # no rest to know it from
+    bodies = {noise: Body("car", 1.0, ("a",), noise=noise) for noise in (None, 1.0)}
+    law = [Coefficient(value, estimated=True, std=0.5 * value) for value in (800.0, 1.0)]
+    found = {}
+    for noise, body in bodies.items():
+        structure = Structure("one", (body, Body("wall", fixed=True)), (Element("spring", ("car", "wall"), *law),))
+        estimator = make_estimator(structure, recording.test, "mrls", preset="thesis", m=4, rewinds=3)
+        found[noise] = run(estimator, recording.samples())
+    rewound = np.mean([any(event.kind == "rewound" for event in e.events) for e in found[1.0]])
+    assert 0.1 < rewound < 0.9, "else the limit decides nothing"
+    for one, other in zip(found[None], found[1.0], strict=True):
+        assert_array_equal(one.parameters, other.parameters)

@@ -37,6 +37,8 @@ def test_correlations_are_those_of_their_definition():
     r, u = random.standard_normal(50), random.standard_normal(50)
     r, u = r - r.mean(), u - u.mean()
     auto, cross = autocorrelation(r, 5), cross_correlation(r, u, 5)
+    assert list(auto.lags) == list(range(6)) and list(cross.lags) == list(range(-5, 6))
+    assert auto.values.shape == auto.lags.shape and cross.values.shape == cross.lags.shape
     for lag, value in zip(auto.lags, auto.values):
         assert_allclose(value, np.sum(r[lag:] * r[: 50 - lag]) / np.sum(r * r), atol=1e-12)
     for lag, value in zip(cross.lags, cross.values):

@@ -2,6 +2,7 @@
 
 import ast
 import sys
+from pathlib import Path
 
 import pytest
 from helpers_paths import PACKAGES, ROOT
@@ -32,7 +33,7 @@ def test_each_changes_one_line_into_code_that_can_be_read():
         ("x = a + b", "x = a - b"),
         ("y = a < b", "y = a >= b"),
         ("y = a < 3", "y = a <= 3"),
-        ("LIMIT = 1.96", "LIMIT = 2.45"),
+        ("def limit():\n    return 1.96", "    return 2.45"),
         ("z = a and b", "z = a or b"),
         ("flag = True", "flag = False"),
     ],
@@ -41,6 +42,26 @@ def test_what_is_changed_into_what(tmp_path, before, after, monkeypatch):
     monkeypatch.setattr(mutants, "SOURCES", tmp_path)
     (tmp_path / "one.py").write_text(before + "\n")
     assert after in [mutant.after for mutant in mutants.mutants_of("core", tmp_path / "one.py")]
+
+
+@pytest.mark.parametrize(
+    ("line", "drawn"),
+    [
+        ("SHARE = 0.3", False),
+        ("EDGES = (0.0, 60.0)", False),
+        ("STAGES = (Stage(1.0, ramp=6.0),)", False),
+        ("PER_RECORD = (512 - 4) // 4", True),  # calculated
+        ("ROBUST = True", True),  # no number
+        ("def f(x):\n    return 0.3 * x", True),
+    ],
+)
+def test_a_number_that_was_chosen_is_no_mistake_in_logic(tmp_path, line, drawn, monkeypatch):
+    monkeypatch.setattr(mutants, "SOURCES", tmp_path)
+    for name, always in (("one.py", False), ("readers/units.py", True)):
+        file = tmp_path / name
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(line + "\n")
+        assert bool(mutants.mutants_of("core", file)) == (drawn or always)
 
 
 def test_messages_and_docstrings_are_left_alone(tmp_path, monkeypatch):
@@ -106,3 +127,14 @@ def test_the_page_keeps_what_other_seeds_gave():
     both = mutants.page(of_two, mutants.page(of_one, ""))
     assert "0 of 1 caught, 0%" in both and "1 of 1 caught, 100%" in both and both.index("Seed 1") < both.index("Seed 2")
     assert mutants.page(of_one, both) == both
+
+
+def test_only_what_numba_compiles_is_judged_as_python(tmp_path, monkeypatch):
+    monkeypatch.setattr(mutant_judges, "SOURCES", tmp_path)
+    path = Path("one.py")
+    compiled = "@njit(cache=True)\ndef f(x):\n    return x\n\n\n"
+    (tmp_path / path).write_text(f"LIMIT = 3\n\n\n\n{compiled}def g(x):\n    return f(x)\n")
+    monkeypatch.setattr(mutant_judges, "_compiled", lambda: ({path}, set()))
+    assert [mutant_judges.is_plain(path, line) for line in (1, 7, 11)] == [True, True, False]
+    mutant_judges._place.cache_clear()
+    mutant_judges._is_compiled.cache_clear()

@@ -1,0 +1,73 @@
+"""The compiled recursion against the readable one on a few samples: quick also where nothing is compiled."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from test_compiled import ARRAYS
+
+from crash_estimator.core.fold import run
+from crash_estimator.core.methods import make_estimator
+from crash_estimator.model_file import load_model
+from crash_replay.recording import Recording
+from crash_replay.synthetic.recordings import SCENARIOS
+
+SAMPLES = 70
+CASES = [("side_dummy_padded", "side_dummy"), ("frontal_engine_cab", "frontal_engine_cab")]
+METHODS = {
+    "rls": {},
+    "mrls": {"cr": 1.5},  # a large one multiplies rounding by itself, and the two would part by that alone
+    "kalman": {},
+    "constrained_kalman": {},
+}
+
+
+def sparse(name: str, noise_seed: int = 3) -> Recording:
+    """Every tenth sample from shortly before the impact, with a dropout on the way."""
+    recording, _ = SCENARIOS[name](noise_seed)
+    first = int(np.searchsorted(recording.time_ns, 0)) - 100
+    time_ns, values = recording.time_ns[first::10][:SAMPLES], recording.values[first::10][:SAMPLES].copy()
+    values[40:43, 0] = np.nan
+    return Recording(recording.test, time_ns, values)
+
+
+def assert_forms_agree(structure, recording, method, **settings):
+    readable, compiled = (
+        run(make_estimator(structure, recording.test, method, compiled=c, **settings), recording.samples())
+        for c in (False, True)
+    )
+    for field in ARRAYS:
+        expected = np.array([getattr(e, field) for e in readable], dtype=float)
+        found = np.array([getattr(e, field) for e in compiled], dtype=float)
+        if field == "residual_std":  # the root of what is left of two nearly equal variances
+            expected, found = expected**2, found**2
+        scale = np.nanmax(np.abs(expected)) or 1.0
+        assert_allclose(found, expected, rtol=0.0, atol=1e-8 * scale, err_msg=field)
+    told = [[(event.kind, event.target) for event in e.events] for e in readable]
+    assert told == [[(event.kind, event.target) for event in e.events] for e in compiled]
+    return readable
+
+
+@pytest.mark.parametrize("name, model", CASES)
+@pytest.mark.parametrize("method", METHODS)
+def test_both_forms_agree_on_a_few_samples(name, model, method):
+    assert_forms_agree(load_model(model), sparse(name), method, **METHODS[method])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_so_they_do_where_the_initial_velocity_is_in_doubt(method):
+    structure = load_model("frontal_engine_cab")
+    bodies = tuple(body if body.fixed else replace(body, velocity_std=0.3) for body in structure.bodies)
+    found = assert_forms_agree(
+        replace(structure, bodies=bodies), sparse("frontal_engine_cab"), method, **METHODS[method]
+    )
+    certain = assert_forms_agree(structure, sparse("frontal_engine_cab"), method, **METHODS[method])
+    assert (found[-1].std >= certain[-1].std).any()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_so_they_do_by_the_preset_of_the_thesis(method):
+    assert_forms_agree(
+        load_model("frontal_engine_cab"), sparse("frontal_engine_cab"), method, preset="thesis", **METHODS[method]
+    )

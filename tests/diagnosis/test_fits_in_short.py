@@ -1,0 +1,81 @@
+"""How a fit ends, and what its residuals are counted by, on the short record of the oracles."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from test_diagnosis_oracles import motion, problem_of, structure
+
+from crash_estimator.core.diagnosis.mechanics.linearization import _steps
+from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.diagnosis.output_error.gauss_newton import fit
+from crash_estimator.core.diagnosis.output_error.problem import make_problem
+from crash_estimator.core.diagnosis.output_error.simulation import simulate
+from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
+from crash_estimator.core.diagnosis.residuals.residuals import analyse
+from crash_estimator.core.effects.kinds.element_force import ElementForce
+from crash_estimator.core.structure import Coefficient, EffectSpec
+from crash_replay.recording import Channel, Recording, Test
+
+RATE = 2500.0
+"""Hz: each sample is a bin."""
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    """Of the striker and the plate, with white noise, from 100 ms before the impact."""
+    before, after = np.arange(-400, 0), np.arange(0, 200)
+    values = np.concatenate([np.zeros((len(before), 3)), motion(after / RATE)[:, :3]])
+    values += np.random.default_rng(2).normal(size=values.shape) * np.array([2.0, 2.0, 50.0])
+    channels = (
+        Channel("striker_ax", "acceleration", "striker", "x"),
+        Channel("plate_ax", "acceleration", "plate", "x"),
+        Channel("wall_fx", "force", "wall", "x"),
+    )
+    time_ns = (np.concatenate([before, after]) * 1e9 / RATE).astype(np.int64)
+    return Recording(Test("striker", channels, initial_velocity={"striker": 6.0}), time_ns, values)
+
+
+@pytest.mark.parametrize("below", [np.inf, 500.0])
+def test_the_true_model_leaves_a_mean_square_of_one_in_whatever_band_it_is_compared(recording, below):
+    """In units of the noise, of the coefficients that are compared."""
+    model = structure()
+    record = observe(model, recording)
+    records = [record if below == np.inf else record.in_band(below)]
+    problem = make_problem(measure_magnitudes(model, records, 12), records, ())
+    assert analyse(fit(problem)).mean_square == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_fit_ends_after_its_last_step_where_that_is_better(recording):
+    """One iteration from a damper that is twice too strong takes most of the error away."""
+    problem, _ = problem_of(structure(EffectSpec("viscous_damping", "foam", 0.0)), recording)
+    term = problem.layout.terms[0].coefficient
+    theta = problem.layout.start.copy()
+    theta[term] += 300.0
+    start = simulate(problem, theta, problem.measured(theta).trajectories)
+    settled, once = fit(problem, start), fit(problem, start, most=1)
+    assert abs(once.theta[term] - settled.theta[term]) < 0.1 * abs(theta[term] - settled.theta[term])
+    assert once.theta[term] != theta[term]
+
+
+@pytest.mark.parametrize("dt", [(0.0, 2e-4), (0.0, 2e-4, 1e-4)])
+def test_the_first_instant_stands_for_as_long_a_step_as_the_next(dt):
+    assert_allclose(_steps(SimpleNamespace(dt=np.array(dt))), [2e-4, *dt[1:]] if len(dt) == 2 else 2e-4)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "unloading", "sought"),
+    [
+        (Coefficient(1e5, estimated=True, shape="curve"), None, False),  # the curve contains it
+        (Coefficient(1e5, estimated=True, shape="curve"), 4e5, True),  # not where it unloads
+        (Coefficient(1e5, estimated=True, shape="constant"), None, True),
+        (Coefficient(1e5, shape="constant"), None, True),
+        (Coefficient(1e5, shape="curve"), None, True),  # known: a curve that no fit is free to bend
+    ],
+)
+def test_a_force_of_the_crush_alone_is_sought_where_no_free_curve_contains_it(stiffness, unloading, sought):
+    effect = ElementForce("bump", "N", force=lambda motion: motion.crush**2, size=1.0, of_crush_only=True)
+    element = SimpleNamespace(name="spring", stiffness=stiffness, unloading=unloading, unloads=unloading is not None)
+    magnitudes = SimpleNamespace(crushed_elements=lambda: [element], element=lambda name: 0)
+    assert bool(list(effect.candidates(SimpleNamespace(), magnitudes))) == sought

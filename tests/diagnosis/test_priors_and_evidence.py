@@ -1,0 +1,105 @@
+"""What a fit's priors say before it, and what its evidence counts: against densities written out."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from crash_estimator.core.diagnosis.output_error.gauss_newton import _shorten, solve
+from crash_estimator.core.diagnosis.output_error.laplace_evidence import log_prior, posterior
+from crash_estimator.core.diagnosis.output_error.normal_equations import Normal
+from crash_estimator.core.diagnosis.parameterization.free_curve import ROUGHNESS, Curve, adapted_roughness
+from crash_estimator.core.diagnosis.parameterization.layout import _element_link, _modes
+from crash_estimator.core.structure import Coefficient, Element
+
+
+def layout(std, low, mean):
+    std = np.array(std)
+    prior = SimpleNamespace(
+        precision=np.diag(std**-2), low=np.array(low), high=np.full(len(std), np.inf), mean=np.array(mean)
+    )
+    return SimpleNamespace(prior=prior, size=len(std))
+
+
+def test_a_prior_that_ends_at_its_mean_is_twice_as_dense_there():
+    """Half a normal, which has the same area; that is what limits away from the mean hardly change."""
+    std = (2.0, 0.01, 300.0)
+    found = log_prior(layout(std, (-np.inf, 0.0, -5.0), (0.0, 0.0, 0.0)))
+    density = 1.0 / (np.sqrt(2.0 * np.pi) * np.array(std)) * [1.0, 2.0, 1.0]
+    assert 0.5 * found == pytest.approx(np.log(density * np.sqrt(2.0 * np.pi)).sum())
+
+
+def test_the_posterior_of_parameters_of_other_units_is_the_inverse_of_their_precision():
+    std, correlation = np.array([1e6, 1e-3]), np.array([[1.0, 0.6], [0.6, 1.0]])
+    precision = np.linalg.inv(correlation * np.outer(std, std))
+    covariance, log_determinant = posterior(precision)
+    assert_allclose(covariance, correlation * np.outer(std, std), rtol=1e-9)
+    assert log_determinant == pytest.approx(-np.log(np.linalg.det(correlation)) - 2.0 * np.log(std).sum())
+
+
+def test_a_curve_that_folds_may_fold_again_and_one_that_does_not_gets_stiffer():
+    """A Student-t prior: far out its scale is in proportion to the bend, near zero it does not depend on it."""
+    knots = np.linspace(0.0, 0.4, 5)
+    curve = Curve(knots, np.array([-1, 0, 1, 2, 3]), 0.4, 1e5)
+
+    def roughness(bend):
+        slopes = np.array([1.0, 1.0, 1.0 + bend, 1.0 + bend]) * 1e5
+        return adapted_roughness(curve, np.cumsum(slopes * np.diff(knots)))
+
+    straight, folded, sharper = roughness(0.0), roughness(1e3), roughness(2e3)
+    assert_allclose(straight, straight[0], rtol=1e-9)
+    assert straight[0] < ROUGHNESS
+    assert folded[1] > 10.0 * ROUGHNESS and sharper[1] == pytest.approx(2.0 * folded[1], rel=1e-3)
+    assert_allclose(folded[[0, 2]], straight[[0, 2]], rtol=1e-9)
+
+
+@pytest.mark.parametrize(("theta", "expected"), [((0.5, 2.0), (-0.5, 1.0)), ((3.0, 2.0), (-2.0, 1.0))])
+def test_a_step_ends_at_the_limits_which_count_from_where_it_begins(theta, expected):
+    normal = Normal(np.eye(2), np.array([-2.0, 1.0]), 10.0, 4, 0.0)
+    of = layout((1e6, 1e6), (0.0, 0.0), (0.0, 0.0))
+    assert_allclose(solve(of, normal, np.array(theta)).delta, expected, rtol=1e-6)
+
+
+def test_a_step_is_shortened_by_its_largest_change_of_a_shape_alone():
+    shapes = np.array([1, 2])
+    assert _shorten(np.array([1e6, 0.1, -0.2]), shapes) == 1.0
+    assert _shorten(np.array([1e6, 0.35, -0.7]), shapes) == pytest.approx(0.5)
+    assert _shorten(np.array([1e6, 0.0, 0.0]), shapes) == 1.0
+    assert _shorten(np.array([1e6]), np.array([], dtype=int)) == 1.0
+
+
+class Builder:
+    """What a layout is built with, as far as it is asked here."""
+
+    def __init__(self):
+        self.start, self.names, self.std = [], [], []
+
+    def add(self, name, start, std, **_):
+        self.start.append(start)
+        self.names.append(name)
+        self.std.append(std)
+        return len(self.start) - 1
+
+
+def test_the_mean_of_two_sensors_has_an_error_smaller_by_the_root_of_two():
+    body = SimpleNamespace(driven=True, acceleration=("left", "right"))
+    signal = SimpleNamespace(noise=3.0, offset_std=0.4)
+    record = SimpleNamespace(at=np.arange(900), signals={"left": signal, "right": signal})
+    builder = Builder()
+    found = _modes(builder, SimpleNamespace(bodies=[body]), record, {})
+    assert found == {0: 0}
+    assert builder.std[0] == pytest.approx(np.hypot(0.4, 3.0 / 30.0) / np.sqrt(2.0))
+    assert builder.std[1:] == pytest.approx(np.full(len(builder.std) - 1, 3.0 * np.sqrt(2.0 / 900.0) / np.sqrt(2.0)))
+
+
+@pytest.mark.parametrize(
+    ("estimated", "curve", "names"),
+    [(True, None, ["spring.stiffness"]), (True, "curve", []), (False, None, []), (False, "curve", [])],
+)
+def test_a_spring_has_a_constant_only_where_it_is_unknown_and_no_curve(estimated, curve, names):
+    element = Element("spring", ("car", "wall"), Coefficient(1e5, estimated=estimated), Coefficient(0.0))
+    magnitudes = SimpleNamespace(stiffness=[1e5], force=[1e4], rate=[10.0])
+    builder = Builder()
+    _element_link(builder, 0, element, {"car": 0, "wall": 1}, curve, magnitudes, (), [])
+    assert builder.names == names

@@ -1,0 +1,41 @@
+"""What was found first may have stood for what was found later: the fits are made up."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from crash_estimator.core.diagnosis import THRESHOLDS
+from crash_estimator.core.diagnosis.selection import pruning
+from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
+from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
+
+
+def model(additions, white=True):
+    evidence = 1000.0 if white else 0.0
+    return SimpleNamespace(additions=tuple(additions), white=white, fit=SimpleNamespace(evidence=evidence))
+
+
+@pytest.mark.parametrize(
+    ("spared", "left"),
+    [
+        ({"mimic"}, ["damper", "friction"]),
+        ({"damper"}, ["mimic", "friction"]),
+        (set(), ["mimic", "damper", "friction"]),
+        ({"mimic", "damper"}, ["friction"]),
+    ],
+)
+def test_an_effect_that_the_rest_leaves_noise_without_goes_again(monkeypatch, spared, left):
+    """The last one found stays: without it there was no noise."""
+    names = ["mimic", "damper", "friction"]
+    monkeypatch.setattr(
+        pruning,
+        "_refitted",
+        lambda magnitudes, additions, like: model(additions, white={*names} - {*additions} <= spared),
+    )
+    path = [SelectionStep(model(names[:k], k == 3), [CandidateFit(name, 50.0, "fit")]) for k, name in enumerate(names)]
+    path.append(SelectionStep(model(names), []))
+    path[-1] = path[-1]._replace(candidates=[CandidateFit("none", 0.5 * THRESHOLDS.gain, "fit")])
+    found, final = pruning.without_the_superseded(None, path, model(names), 0)
+    assert list(final.additions) == left
+    assert [step.candidates[0].addition for step in found] == [*left, "none"]
+    assert found[-1].before.additions == final.additions

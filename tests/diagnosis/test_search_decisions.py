@@ -1,0 +1,169 @@
+"""How far a search goes: the fits are made up, what is tried after them is judged."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from crash_estimator.core.diagnosis import THRESHOLDS
+from crash_estimator.core.diagnosis.online import candidate_turns
+from crash_estimator.core.diagnosis.online.candidate_turns import OnlineState
+from crash_estimator.core.diagnosis.selection import assumptions, candidate_fits, forward_selection, selection_step
+from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
+
+
+def model(white=False, cost=1000.0, mean_square=50.0, evidence=0.0, additions=()):
+    fit = SimpleNamespace(cost=cost, evidence=evidence, layout=None)
+    residuals = SimpleNamespace(mean_square=mean_square)
+    return SimpleNamespace(fit=fit, white=white, residuals=residuals, additions=additions, records=(), roughness=None)
+
+
+def candidate(gain, key=("friction", "spring"), fitted=True):
+    addition = SimpleNamespace(key=key, effect=SimpleNamespace(coefficient_grid=lambda: ()))
+    return CandidateFit(addition, gain, SimpleNamespace(evidence=gain) if fitted else None)
+
+
+CARE = ["slowly", "other_variants", "anew", "from_motion"]
+MORE = ["from_model", "from_motion", "profile", "from_motion", "slowly", "anew"]
+
+
+@pytest.mark.parametrize(
+    ("out_of_reach", "explains_most", "tried"),
+    [(False, False, CARE + MORE), (False, True, CARE + MORE), (True, False, CARE), (True, True, [])],
+)
+def test_where_noise_is_out_of_reach_only_care_is_taken_and_that_until_most_is_explained(
+    monkeypatch, out_of_reach, explains_most, tried
+):
+    called = []
+
+    class Search:
+        def __init__(self, *given):
+            self.begun = False
+
+        def __getattr__(self, name):
+            return lambda *given: called.append(name)
+
+        def go_on_from(self, given):
+            called.clear()  # what comes before is done whatever is found
+
+        out_of_reach = staticmethod(lambda: out_of_reach)
+        explains_most = staticmethod(lambda: explains_most)
+        reached_the_floor = staticmethod(lambda: False)
+        ranking = staticmethod(lambda: called)
+
+    monkeypatch.setattr(candidate_fits, "_Search", Search)
+    monkeypatch.setattr(candidate_fits, "candidates", lambda *given: ())
+    monkeypatch.setattr(candidate_fits, "screen", lambda *given: [])
+    monkeypatch.setattr(candidate_fits, "out_of_time", lambda: False)
+    assert candidate_fits.fit_candidates(None, {}, model(), thorough=True) == tried
+
+
+@pytest.mark.parametrize(("leaves_noise", "out_of_time", "looked_for"), [
+    (False, False, True), (True, False, False), (False, True, False),
+])  # fmt: skip
+def test_an_effect_on_two_elements_is_looked_for_only_where_one_leaves_more_than_noise_and_there_is_time(
+    monkeypatch, leaves_noise, out_of_time, looked_for
+):
+    asked, given = [], model(white=True)
+    first = SimpleNamespace(leaves_noise=leaves_noise, candidates=[])
+    monkeypatch.setattr(forward_selection, "as_expected", lambda *given: None)
+    monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda *given: first)
+    monkeypatch.setattr(forward_selection, "out_of_time", lambda: out_of_time)
+    monkeypatch.setattr(forward_selection, "two_of_one_effect", lambda *given: asked.append(given) or [])
+    monkeypatch.setattr(forward_selection, "near_the_floor", lambda *given: None)
+    monkeypatch.setattr(forward_selection, "_one_by_one", lambda *given: ([first], model(white=True)))
+    forward_selection.forward_selection(None, {}, given)
+    assert bool(asked) == looked_for
+
+
+def test_a_search_out_of_time_has_looked_at_all_candidates_once(monkeypatch):
+    step = SimpleNamespace(best=None, before=None, candidates=[])
+    monkeypatch.setattr(forward_selection, "out_of_time", lambda: True)
+    monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda *given: step)
+    monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done: done)
+    monkeypatch.setattr(forward_selection, "better", lambda one, other: False)
+    monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final, present: (path, final))
+    path, _ = forward_selection._one_by_one(None, {}, model(), [], 0)
+    assert path == [step]
+
+
+@pytest.mark.parametrize(("promised", "tried"), [({}, []), ({"b": 3.0}, ["b"]), ({"a": 2.0, "c": 3.0}, ["c", "a"])])
+def test_contacts_are_assumed_otherwise_as_long_as_that_promises_anything(monkeypatch, promised, tried):
+    searched = []
+    path = SimpleNamespace(structure="", records=(), added=())
+    for name, short in (("never_pulling", "a"), ("elastic_when_spent", "b"), ("all_when_spent", "c")):
+        monkeypatch.setattr(assumptions, name, lambda structure, short=short: short)
+    monkeypatch.setattr(assumptions, "_promised", lambda other, *given: promised.get(other, -np.inf))
+    monkeypatch.setattr(assumptions, "out_of_time", lambda: False)
+    monkeypatch.setattr(assumptions, "SelectionPath", SimpleNamespace(rank=lambda one: 0))
+    monkeypatch.setattr(assumptions, "_as_exact_as_needed", lambda s, *given: searched.append(s) or path)
+    assert assumptions._selected("", (), {}) is path
+    assert searched == ["", *tried]
+
+
+@pytest.mark.parametrize(("gain", "cost", "promises"), [
+    (0.9, 1000.0, False),  # less than any candidate must gain
+    (1.1, 1000.0, True),
+    (1.1, 200_000.0, False),  # nothing beside what is left above the noise of a thousand samples
+])  # fmt: skip
+def test_other_contacts_must_explain_a_share_of_what_is_above_the_noise(monkeypatch, gain, cost, promises):
+    final = model(cost=cost, additions=("one",))
+    record = SimpleNamespace(bins=500, measured=np.zeros((1, 2)))
+    path = SimpleNamespace(
+        structure="as stated", added=("one",), final=final, cells=36, steps=[SimpleNamespace(before=final)],
+        as_recorded=final.fit,
+    )  # fmt: skip
+    otherwise = SimpleNamespace(fit=SimpleNamespace(evidence=gain * THRESHOLDS.gain))
+    monkeypatch.setattr(assumptions, "measure_magnitudes", lambda *given: None)
+    monkeypatch.setattr(assumptions, "in_the_sensors_noise", lambda model, records: model.fit)
+    monkeypatch.setattr(assumptions, "_likely", lambda path: ())
+    monkeypatch.setattr(assumptions, "_moves_otherwise", lambda *given: True)
+    monkeypatch.setattr(assumptions, "fit_model", lambda *given: otherwise)
+    assert np.isfinite(assumptions._promised("other", path, [record])) == promises
+
+
+def test_a_larger_noise_is_that_of_a_candidate_that_gains(monkeypatch):
+    """Of those that do, the one whose noise makes the recordings likeliest: the largest whitener."""
+    step = selection_step.SelectionStep(
+        model(), [candidate(500.0), candidate(300.0), candidate(0.5 * THRESHOLDS.gain), candidate(900.0, fitted=False)]
+    )
+    monkeypatch.setattr(selection_step, "analyse", lambda fit: SimpleNamespace(residual=fit.evidence))
+    monkeypatch.setattr(selection_step, "bounded", lambda residual, records: residual)
+    whitener = {500.0: 1.0, 300.0: 2.0, 0.5 * THRESHOLDS.gain: 9.0}
+    monkeypatch.setattr(
+        selection_step,
+        "with_inflated_noise",
+        lambda records, left: (SimpleNamespace(of=left, whitener=whitener[left] * np.eye(2)),),
+    )
+    (found,) = selection_step._noise_left_by(step, ())
+    assert found.of == 300.0
+
+
+@pytest.mark.parametrize(("white", "by_fit"), [(False, {2, 6, 10}), (True, {0, 2, 4, 6, 8, 10})])
+def test_every_other_screening_is_along_the_model_s_own_motion(monkeypatch, white, by_fit):
+    """A strong effect is seen along the measured one, a weak one along the model's."""
+    seen, before = [], model(white=white)
+    monkeypatch.setattr(candidate_turns, "candidates", lambda *given: ())
+    monkeypatch.setattr(candidate_turns, "screen", lambda *given, fitted: seen.append(fitted) or ())
+    for updates in range(0, 12, 2):
+        candidate_turns._screened(OnlineState(updates=updates), None, {}, before)
+    assert {2 * k for k, fitted in enumerate(seen) if fitted is before.fit} == by_fit
+
+
+@pytest.mark.parametrize(("leader", "has_fit", "goes_on"), [
+    (True, True, True), (True, False, False), (False, True, False), (False, False, False),
+])  # fmt: skip
+def test_only_the_leader_goes_on_from_its_own_last_fit(monkeypatch, leader, has_fit, goes_on):
+    fits = []
+    addition = SimpleNamespace(key=("friction", "spring"))
+    monkeypatch.setattr(candidate_turns, "make_problem", lambda *given: "problem")
+    monkeypatch.setattr(candidate_turns, "carried_on", lambda last, problem: f"on from {last}")
+    monkeypatch.setattr(
+        candidate_turns, "fit", lambda problem, start, *more, **m: fits.append(start) or SimpleNamespace(cost=1.0)
+    )
+    state = OnlineState(
+        leaders=(addition if leader else SimpleNamespace(key=addition.key),),
+        fits={addition.key: "its last"} if has_fit else {},
+    )
+    candidate_turns._fit(state, model(), None, addition, None)
+    assert fits == (["on from its last"] if goes_on else [None])
