@@ -26,7 +26,7 @@ import numpy as np
 
 from crash_replay.recording import Sample, Test
 
-from ..estimate import Description, Estimate, ParameterStatus
+from ..estimate import Description, Estimate, ParameterStatus, nothing_said
 from ..kinematics import Kinematics, KinematicState, Motion
 from ..regression import Regression
 from ..structure import ModelError, Structure
@@ -174,29 +174,19 @@ class EffectiveMass:
         psi, balance = regression.gradient, self._balance(after)
         predicted = regression.known + psi @ after.theta
         innovation_covariance = balance.variance + psi @ balance.covariance @ psi.T
-        nothing, none = np.zeros(0), np.zeros(0, dtype=np.uint8)
-        n = len(self.free)
-        return Estimate(
-            number=sample.number,
-            time_ns=sample.time_ns,
+        return nothing_said(self.description, sample.number, sample.time_ns)._replace(
             parameters=self.back @ after.theta + self.constant,
             covariance=self.back @ balance.covariance @ self.back.T,
-            status=np.full(n, ParameterStatus.ESTIMATED, dtype=np.uint8),
+            status=np.full(len(self.free), ParameterStatus.ESTIMATED, dtype=np.uint8),
             measured=regression.measured,
             predicted=predicted,
             innovation=regression.measured - regression.known - psi @ before,
             innovation_covariance=innovation_covariance,
             residual=regression.measured - predicted,
             residual_std=np.full(1, np.sqrt(balance.variance)),
-            crush=nothing,
-            rate=nothing,
-            force=nothing,
-            force_std=nothing,
-            state=none,
             displacement=motion.displacement,
             velocity=motion.velocity,
             acceleration=motion.acceleration,
-            events=(),
         )
 
 
