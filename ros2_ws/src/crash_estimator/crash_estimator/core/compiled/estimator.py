@@ -1,5 +1,6 @@
 """The compiled recursion behind the same interface as `core.estimator.Estimator`: `init`, `step`, `description`."""
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,8 @@ class CompiledEstimator:
         self._row_length = length(ROW, self.size)
         self._state_length = self._row_length + length(STATE, self.size)
         self.columns = slices(ROW, self.size)
+        own = {one.name for one in fields(Estimate)}
+        self.parts = [(name, place) for name, place in self.columns.items() if name in own]
 
     def init(self) -> np.ndarray:
         state = np.zeros(self._state_length)
@@ -103,7 +106,7 @@ class CompiledEstimator:
 
 
 class EstimateOfRow(Estimate):
-    """An Estimate that is read out of a row when it is asked for: of most, few numbers are."""
+    """An Estimate that is read out of a row when something of it is asked for: of most, nothing is."""
 
     def __init__(self, of: CompiledEstimator, number: int, time_ns: int, row: np.ndarray, before: np.ndarray):
         """row: or a state, which begins with one; before: the row before it, for the events."""
@@ -112,36 +115,21 @@ class EstimateOfRow(Estimate):
 
     def __getattr__(self, field: str) -> Any:
         """Called for what has not been read yet."""
-        read = READ.get(field, _part if field in ROW else None)
-        if read is None:
+        own = self.__dict__
+        if "of" not in own or "events" in own:
             raise AttributeError(f"an Estimate has no {field}")
-        value = self.__dict__[field] = read(self, field)
-        return value
+        of, row = self.of, self.row
+        own.update({name: row[place] for name, place in of.parts})
+        for name in CODES:
+            own[name] = own[name].astype(np.uint8)
+        p, q = of.size.estimated, of.size.equations
+        own["innovation_covariance"] = own["innovation_covariance"].reshape(q, q)
+        covariance = own["covariance"] = own["covariance"].reshape(p, p)
+        if p < of.size.parameters:  # zero where one is known
+            own["covariance"] = np.zeros((of.size.parameters,) * 2)
+            own["covariance"][of.estimated] = covariance
+        own["events"] = of.events(row, self.before, self.time_ns) if row[of.columns["news"]] else ()
+        return getattr(self, field)
 
 
-def _part(estimate: EstimateOfRow, field: str) -> np.ndarray:
-    part = estimate.row[estimate.of.columns[field]]
-    return part.astype(np.uint8) if QUANTITIES[field].code else part
-
-
-def _covariance(estimate: EstimateOfRow, field: str) -> np.ndarray:
-    """Of all parameters: zero where one is known."""
-    of, (p, all_p) = estimate.of, (estimate.of.size.estimated, estimate.of.size.parameters)
-    of_estimated = estimate.row[of.columns[field]].reshape(p, p)
-    if p == all_p:
-        return of_estimated
-    covariance = np.zeros((all_p, all_p))
-    covariance[of.estimated] = of_estimated
-    return covariance
-
-
-def _innovation_covariance(estimate: EstimateOfRow, field: str) -> np.ndarray:
-    return estimate.row[estimate.of.columns[field]].reshape((estimate.of.size.equations,) * 2)
-
-
-def _events(estimate: EstimateOfRow, field: str) -> tuple[Event, ...]:
-    of, row = estimate.of, estimate.row
-    return of.events(row, estimate.before, estimate.time_ns) if row[of.columns["news"]] else ()
-
-
-READ = {"covariance": _covariance, "innovation_covariance": _innovation_covariance, "events": _events}
+CODES = [name for name, quantity in QUANTITIES.items() if quantity.code]
