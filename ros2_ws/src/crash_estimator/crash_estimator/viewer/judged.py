@@ -1,6 +1,6 @@
 """Blocks -> estimates again, and what the validation says of them (thesis 3.7). Neither ROS nor Rerun here."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from functools import reduce
 from typing import NamedTuple
 
@@ -58,10 +58,17 @@ class Jury:
 
 def judge(structure: Structure, blocks: list[Block]) -> Judged | None:
     """All blocks of one estimator in one pass; None where they do not belong to the structure."""
-    kinds: Mapping[type, Block] = {type(block): block for block in join(blocks)}
-    if kinds.keys() != {ParameterBlock, ResidualBlock, ForceBlock}:
+    parameters = residuals = forces = None
+    for block in join(blocks):
+        match block:
+            case ParameterBlock():
+                parameters = block
+            case ResidualBlock():
+                residuals = block
+            case ForceBlock():
+                forces = block
+    if parameters is None or residuals is None or forces is None:
         return None
-    parameters, residuals, forces = kinds[ParameterBlock], kinds[ResidualBlock], kinds[ForceBlock]
     fits = tuple(element.name for element in structure.elements) == forces.element
     if not fits:
         return None
@@ -87,7 +94,7 @@ def describe(parameters: ParameterBlock, residuals: ResidualBlock, forces: Force
         equations=residuals.name,
         equation_units=residuals.unit,
         elements=forces.element,
-        between=tuple(tuple(ends.split("-", 1)) for ends in forces.between),
+        between=tuple((one, other) for one, _, other in (ends.partition("-") for ends in forces.between)),
         bodies=forces.body,
         masses=tuple(forces.mass),
     )
@@ -95,10 +102,10 @@ def describe(parameters: ParameterBlock, residuals: ResidualBlock, forces: Force
 
 def estimates_of(parameters: ParameterBlock, residuals: ResidualBlock, forces: ForceBlock) -> list[Estimate]:
     """Samples that all three tell of; of the covariances only the diagonals are known."""
-    blocks = parameters, residuals, forces
+    blocks: list[Block] = [parameters, residuals, forces]
     common = reduce(np.intersect1d, (block.time_ns for block in blocks))
     places = zip(*(np.searchsorted(block.time_ns, common) for block in blocks), strict=True)
-    nothing = nothing_said(describe(*blocks))
+    nothing = nothing_said(describe(parameters, residuals, forces))
     fields = [(getattr(block, field), which, field) for which, block in enumerate(blocks) for field in said_of(block)]
     return [
         as_sent(
