@@ -4,18 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from crash_estimator.core.compiled.layout import row_fields, state_fields
+from crash_estimator.core.compiled.layout import ROW, STATE, shapes
 from crash_estimator.core.compiled.linear import invert
 from crash_estimator.core.compiled.plan import flat, make_method_plan
-from crash_estimator.core.compiled.views import (
-    RowViews,
-    StateViews,
-    method_of,
-    plan_views,
-    row_views,
-    size_of,
-    state_views,
-)
+from crash_estimator.core.compiled.views import method_of, plan_views, row_views, size_of, state_views
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.model_file import load_model
 from crash_replay.synthetic.recordings import SCENARIOS
@@ -29,14 +21,12 @@ def compiled_form(name, method):
 
 def test_the_views_are_those_of_the_layout():
     estimator = compiled_form("frontal_single", "mrls")
-    for fields, make, views in (
-        (state_fields(estimator.size), state_views, StateViews),
-        (row_fields(estimator.size), row_views, RowViews),
-    ):
-        assert tuple(fields) == views._fields
-        flat = np.arange(sum(int(np.prod(shape)) for shape in fields.values()), dtype=float)
+    for table, make in ((STATE, state_views), (ROW, row_views)):
+        given = shapes(table, estimator.size)
+        flat = np.arange(sum(int(np.prod(shape)) for shape in given.values()), dtype=float)
         parts = make(flat, estimator.size)
-        assert [part.shape for part in parts] == list(fields.values())
+        assert parts._fields == tuple(given)
+        assert [part.shape for part in parts] == list(given.values())
         assert_array_equal(np.concatenate([part.ravel() for part in parts]), flat)
 
 
@@ -47,9 +37,8 @@ def test_a_plan_comes_back_from_its_two_arrays(method):
     whole, others = flat(estimator.size, settings, estimator.plan)
     assert size_of(whole) == estimator.size
     assert_array_equal(method_of(others), settings)
-    for name, found, given in zip(
-        estimator.plan._fields, plan_views(whole, others, estimator.size), estimator.plan, strict=True
-    ):
+    plan = plan_views(whole[len(estimator.size) :], others[len(settings) :], estimator.size)
+    for name, found, given in zip(estimator.plan._fields, plan, estimator.plan, strict=True):
         assert_array_equal(found, given, err_msg=name)
 
 

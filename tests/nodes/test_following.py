@@ -35,6 +35,12 @@ def recording() -> Recording:
     return recording
 
 
+def enough(recording: Recording, method: str) -> Recording:
+    """For a method that is not compiled a record that ends soon after the dropout: contact, fade and gap are in it."""
+    last = len(recording) if method in COMPILED else 260
+    return Recording(recording.test, recording.time_ns[:last], recording.values[:last])
+
+
 def rows_of(recording: Recording, start: int, stop: int) -> Rows:
     return Rows(start, recording.time_ns[start:stop], recording.values[start:stop])
 
@@ -65,13 +71,15 @@ def assert_same(columns, expected, start: int = 0):
 @pytest.fixture(scope="module")
 def whole(recording):
     """Method -> what the one loop says, sample by sample."""
-    return {m: columns_of(run(follower_of(recording, m).estimator, recording.samples())) for m in METHODS_HERE}
+    return {
+        m: columns_of(run(follower_of(recording, m).estimator, enough(recording, m).samples())) for m in METHODS_HERE
+    }
 
 
 @pytest.mark.parametrize("method", METHODS_HERE)
 @pytest.mark.parametrize("block", [7, 1000])
 def test_blocks_give_what_single_samples_give(recording, whole, method, block):
-    estimator = follower_of(recording, method).estimator
+    recording, estimator = enough(recording, method), follower_of(recording, method).estimator
     state = estimator.init()
     for start in range(0, len(recording), block):
         state, columns = follow(estimator, state, rows_of(recording, start, min(start + block, len(recording))))
@@ -85,6 +93,8 @@ def test_there_is_something_to_tell_of(whole):
 
 @pytest.mark.parametrize("method", METHODS_HERE)
 def test_any_way_leads_to_the_same_estimates(recording, whole, method):
+    recording = enough(recording, method)
+
     @settings(max_examples=25 if method in COMPILED else 3, deadline=None)
     @given(st.lists(st.tuples(st.integers(0, len(recording) - 1), st.integers(1, 60)), min_size=1, max_size=6))
     def check(jumps):
@@ -146,8 +156,8 @@ def test_going_back_costs_a_short_way_and_memory_is_bounded():
 def test_a_checkpoint_does_not_hold_a_block_in_memory(recording):
     follower = follower_of(recording)
     take(follower, recording, 0, 300)
-    row = follower.checkpoints.states[-1].last_row
-    assert row.base is None and len(row) < 300
+    state, estimator = follower.checkpoints.states[-1], follower.estimator
+    assert state.base is None and len(estimator.last_row(state)) < 300
 
 
 def test_what_is_lost_sent_twice_or_begins_a_pass_is_told_apart(recording):

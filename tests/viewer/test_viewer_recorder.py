@@ -16,7 +16,7 @@ from helpers_viewer import NAMES, column, feed, recorder, rows, series, settle, 
 from helpers_waiting import PATIENCE
 from rerun.chunk import RrdReader
 
-from crash_estimator.viewer.blocks import ForceBlock, ParameterBlock
+from crash_estimator.viewer.blocks import ForceBlock, ParameterBlock, said_of
 from crash_estimator.viewer.native import viewer_binary
 from crash_estimator.viewer.sinks import usable_port
 
@@ -136,7 +136,7 @@ def test_values_that_are_not_finite_leave_gaps_only(crash, streams, tmp_path):
     target = recorder(tmp_path / "gaps.rrd", say=said.append)
     spoiled = []
     for block in streams["mrls"]:
-        values = {name: getattr(block, name).copy() for name in block.over_time if getattr(block, name).dtype == float}
+        values = {name: getattr(block, name).copy() for name in said_of(block) if getattr(block, name).dtype == float}
         for table in values.values():
             table[3], table[7] = np.nan, np.inf
         spoiled.append(block._replace(**values))

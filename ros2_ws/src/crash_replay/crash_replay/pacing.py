@@ -52,7 +52,8 @@ class Outlet(Protocol):
     def test_has_arrived(self) -> bool: ...
     def all_have_arrived(self) -> bool: ...
 
-    audience: "Listening"
+    @property
+    def audience(self) -> "Listening": ...
 
 
 class Listening(Protocol):

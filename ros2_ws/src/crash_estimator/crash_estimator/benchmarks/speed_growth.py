@@ -62,5 +62,5 @@ def _length(folder: Path, seconds: Sequence[float]) -> Iterator[Row]:
     what = "a sample by the record's length at 10 kHz"
     yield Row(what, numbers, "constant: linear in length", cost[-1] / cost[0], 1.5, least=False)
     said = f"{peaks[0] / 1024:.0f} to {peaks[-1] / 1024:.0f} KiB"
-    bound = f"state {state.memory.nbytes} bytes, blocks of {BLOCK}"
+    bound = f"state {state.nbytes} bytes, blocks of {BLOCK}"
     yield Row("memory that following it takes at most", said, bound, peaks[-1] / peaks[0], 1.1, least=False)

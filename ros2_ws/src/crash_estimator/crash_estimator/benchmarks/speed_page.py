@@ -29,11 +29,12 @@ def whole_page(rows: Sequence[Row], load: float) -> list[str]:
 
 def renewed_page(page: str, rows: Sequence[Row], load: float) -> list[str]:
     """The page with these rows in place of those of the same name, new ones at the end of its table."""
-    lines = page.rstrip().splitlines()
+    lines, renewed = page.rstrip().splitlines(), set()  # rows of one name are renewed in their order
     for row, line in zip(rows, _table(rows).splitlines()[2:], strict=True):
-        places = [k for k, there in enumerate(lines) if there.startswith(f"| {row.what} |")]
+        places = [k for k, there in enumerate(lines) if there.startswith(f"| {row.what} |") and k not in renewed]
         if places:
             lines[places[0]] = line
+            renewed.add(places[0])
         else:
             lines.insert(1 + max(k for k, there in enumerate(lines) if there.startswith("|")), line)
     names = "; ".join(f"*{row.what}*" for row in rows)

@@ -18,17 +18,10 @@ from crash_replay.middleware import prepare_middleware
 from crash_replay.qos import EVERY_SAMPLE, STREAM
 from crash_replay.ros_runtime import spin
 
-FIELDS = {
-    ParametersBlock: {"name": "", "value": 1, "std": 1, "status": 0},
-    ResidualsBlock: {
-        "name": "", "measured": 1, "predicted": 1,
-        "innovation": 1, "innovation_std": 1, "residual": 1, "residual_std": 1,
-    },
-    Forces: {"element": "", "crush": 1, "rate": 1, "force": 1, "force_std": 1, "state": 0},
-}  # fmt: skip
-"""Message -> its fields of one value a row: a name, a double or a byte."""
+from ..core.estimate import ROW
+from ..nodes.estimate_messages import FIELDS
+
 TOPICS = {ParametersBlock: "block/parameters", ResidualsBlock: "block/residuals", Forces: "forces"}
-OF_BODIES = ("displacement", "velocity", "acceleration")
 
 
 class Relay(Node):
@@ -43,19 +36,18 @@ class Relay(Node):
     def _empty(self, samples: int) -> list:
         """Messages for so many samples; they are filled once."""
         messages = []
-        for kind, fields in FIELDS.items():
+        for kind in TOPICS:
             n, message = self.width[kind], kind(model="none", method="relay")
-            for field, what in fields.items():
-                names = [f"b{k}.stiffness" for k in range(n)]
-                numbers = array("d", bytes(8 * n * samples)) if what else array("B", bytes(n * samples))
-                setattr(message, field, names if what == "" else numbers)
+            names = [f"b{k}.stiffness" for k in range(n)]
             if kind is Forces:
-                message.between, message.body = ["a-b"] * n, [f"b{k}" for k in range(self.bodies)]
+                message.element, message.between = names, ["a-b"] * n
+                message.body = [f"b{k}" for k in range(self.bodies)]
                 message.mass = array("d", bytes(8 * self.bodies))
-                for field in OF_BODIES:
-                    setattr(message, field, array("d", bytes(8 * self.bodies * samples)))
             else:
-                message.unit = ["N/m"] * n
+                message.name, message.unit = names, ["N/m"] * n
+            for field, name in FIELDS[kind].items():
+                count = samples * (self.bodies if ROW[name].of == "bodies" else n)
+                setattr(message, field, array("B", bytes(count)) if ROW[name].code else array("d", bytes(8 * count)))
             messages.append(message)
         return messages
 

@@ -1,7 +1,9 @@
 """What every estimation method says about one sample, in one form, so that no consumer asks which method it was."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -52,7 +54,51 @@ class Description(NamedTuple):
     extra_units: tuple[str, ...] = ()
 
 
-class Estimate(NamedTuple):
+class Quantity(NamedTuple):
+    """A number that an estimate says for each of the things that it is `of`."""
+
+    of: str  # the field of Description that names them: parameters, equations, elements or bodies
+    sent_as: str = ""  # its field in the messages, where that has another name
+    code: bool = False  # a whole number: ParameterStatus, ElementState
+
+
+ROW = {
+    "parameters": Quantity("parameters", sent_as="value"),
+    "std": Quantity("parameters"),
+    "status": Quantity("parameters", code=True),
+    "measured": Quantity("equations"),
+    "predicted": Quantity("equations"),
+    "innovation": Quantity("equations"),
+    "innovation_std": Quantity("equations"),
+    "residual": Quantity("equations"),
+    "residual_std": Quantity("equations"),
+    "crush": Quantity("elements"),
+    "rate": Quantity("elements"),
+    "force": Quantity("elements"),
+    "force_std": Quantity("elements"),
+    "state": Quantity("elements", code=True),
+    "displacement": Quantity("bodies"),
+    "velocity": Quantity("bodies"),
+    "acceleration": Quantity("bodies"),
+}
+"""The one description of what travels of an estimate, in the order of the messages' fields.
+
+The compiled recursion's rows, columns, messages, those by name and what reads them are derived from it. A further
+number is a line here and a field of Estimate, what computes it (`estimator.py`, `compiled/follow.py`), and its line in
+the `.msg`."""
+
+
+DIAGONALS = {"std": "covariance", "innovation_std": "innovation_covariance"}
+"""Roots of the diagonal of a matrix, of which no more travels."""
+
+
+def sent(*of: str) -> dict[str, str]:
+    """Field of the messages -> name, of what is said of parameters, equations, elements or bodies."""
+    return {quantity.sent_as or name: name for name, quantity in ROW.items() if quantity.of in of}
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
     """The state of knowledge after one sample: p parameters, q equations, e elements, b bodies."""
 
     number: int  # of the sample
@@ -78,10 +124,50 @@ class Estimate(NamedTuple):
     extra: tuple[float, ...] = ()  # the values of Description.extra, NaN until there are any
     extra_std: tuple[float, ...] = ()  # of each, NaN where none is known
 
+    def _replace(self, **changes: Any) -> "Estimate":
+        """The same with other values of these fields."""
+        return Estimate(**({one.name: getattr(self, one.name) for one in fields(Estimate)} | changes))
+
     @property
     def std(self) -> np.ndarray:
         """(p,) standard deviation of each parameter."""
         return standard_deviations(self.covariance)
+
+    @property
+    def innovation_std(self) -> np.ndarray:
+        """(q,) standard deviation of each equation's innovation."""
+        return np.sqrt(np.diagonal(self.innovation_covariance))
+
+
+def nothing_said(description: Description, number: int = 0, time_ns: int = 0) -> Estimate:
+    """An estimate of NaN, and of zeros where it is codes, for who knows only some of it to replace."""
+    sizes = {of: len(getattr(description, of)) for of in ("parameters", "equations", "elements", "bodies")}
+    said: dict[str, Any] = {
+        name: np.zeros(sizes[of], dtype=np.uint8) if code else np.full(sizes[of], np.nan)
+        for name, (of, _, code) in ROW.items()
+        if name not in DIAGONALS
+    }
+    said |= {matrix: np.full((sizes[ROW[name].of],) * 2, np.nan) for name, matrix in DIAGONALS.items()}
+    return Estimate(number=number, time_ns=time_ns, events=(), **said)
+
+
+def as_sent(
+    nothing: Estimate, number: int, time_ns: int, fields_sent: Mapping[str, np.ndarray], elsewhere: float
+) -> Estimate:
+    """What the messages' fields tell of a sample, without events; nothing: of its estimator, as to the rest.
+
+    Of the covariances only the diagonals travel: all else in them is `elsewhere`.
+    """
+    own, said = len(nothing.parameters), {}
+    for field, name in sent("parameters", "equations", "elements", "bodies").items():
+        if field in fields_sent:
+            values = fields_sent[field]
+            said[name] = values[:own] if ROW[name].of == "parameters" else values
+    for name, matrix in DIAGONALS.items():
+        said[matrix] = np.full((len(said[name]),) * 2, elsewhere)
+        np.fill_diagonal(said[matrix], said.pop(name) ** 2)
+    extra, extra_std = (tuple(fields_sent[field][own:].tolist()) for field in ("value", "std"))
+    return nothing._replace(number=number, time_ns=time_ns, **said, extra=extra, extra_std=extra_std)
 
 
 def standard_deviations(covariance: np.ndarray) -> np.ndarray:

@@ -194,6 +194,6 @@ class Structure:
 
     def _names_a_channel(self, effect: EffectSpec, wanted: list[tuple[str, str, str]]) -> bool:
         """Whether an effect's target is a channel that no body or element reads."""
-        others = {name for _, name, _ in wanted} | {part.name for part in (*self.bodies, *self.elements)}
+        others = {name for _, name, _ in wanted} | {b.name for b in self.bodies} | {e.name for e in self.elements}
         pairs = {f"{a.name}-{b.name}" for a in self.bodies for b in self.bodies}
         return effect.target not in others | pairs

@@ -1,24 +1,21 @@
 """Estimates of consecutive samples as columns, the form in which they travel: from the compiled recursion's rows as
 they are, or from `Estimate`s."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from math import isfinite, isqrt
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
-from ..core.estimate import Estimate, Event, ParameterStatus
+from ..core.estimate import ROW, Estimate, Event, ParameterStatus, sent
 from ..core.methods import AnyEstimator
 from ..kept import Rows
 
 if TYPE_CHECKING:  # who only reads estimates has no use for numba, which takes half a second to import
-    from ..core.compiled.estimator import CompiledEstimator, CompiledState
+    from ..core.compiled.estimator import CompiledEstimator
 
-FIELDS = (
-    *("covariance", "status", "measured", "predicted", "innovation", "residual", "residual_std"),
-    *("crush", "rate", "force", "force_std", "state", "displacement", "velocity", "acceleration"),
-)
-"""Of an `Estimate`, taken as they are."""
+SENT = sent("parameters", "equations", "elements", "bodies") | {"covariance": "covariance"}
+"""Field of the messages -> name in an Estimate; the covariance is what the node's health looks at."""
 
 
 class Columns(NamedTuple):
@@ -33,7 +30,7 @@ class Columns(NamedTuple):
     def __len__(self) -> int:
         return len(self.time_ns)
 
-    def later(self, fields: Sequence[str]) -> tuple[Callable[[], "Columns"], int]:
+    def later(self, fields: Iterable[str]) -> tuple[Callable[[], "Columns"], int]:
         """What gives these fields when they are wanted, and the bytes that it keeps until then."""
         if self.again:
             return self.again.columns, self.again.nbytes
@@ -49,12 +46,12 @@ class Again(NamedTuple):
     """
 
     estimator: "CompiledEstimator"
-    state: "CompiledState"  # before the block
+    state: np.ndarray  # before the block
     rows: Rows  # views of what is kept
 
     @property
     def nbytes(self) -> int:
-        return sum(array.nbytes for array in self.state)
+        return self.state.nbytes
 
     def columns(self) -> Columns:
         """Without the events."""
@@ -95,19 +92,20 @@ NOT_FINITE = "the parameters are no longer finite"
 
 def columns_of(estimates: Sequence[Estimate]) -> Columns:
     """Of consecutive estimates, at least one."""
-    of = {name: np.array([getattr(e, name) for e in estimates]) for name in FIELDS}
-    besides = np.full(len(estimates[0].extra), ParameterStatus.METHOD, dtype=np.uint8)
-    of["value"] = np.array([np.concatenate([e.parameters, e.extra]) for e in estimates])
-    of["std"] = np.array([np.concatenate([e.std, e.extra_std]) for e in estimates])
-    of["status"] = np.hstack([of["status"], np.tile(besides, (len(estimates), 1))])
-    of["innovation_std"] = np.sqrt(np.array([np.diagonal(e.innovation_covariance) for e in estimates]))
+    of = {field: np.array([getattr(e, name) for e in estimates]) for field, name in SENT.items()}
+    besides = np.array([e.extra for e in estimates])
+    methods = {
+        "parameters": besides,
+        "std": np.array([e.extra_std for e in estimates]),
+        "status": np.full(besides.shape, ParameterStatus.METHOD, dtype=np.uint8),
+    }
+    for field, name in sent("parameters").items():
+        of[field] = np.hstack([of[field], methods.get(name, np.full(besides.shape, np.nan))])
     events = [(row, event) for row, estimate in enumerate(estimates) for event in estimate.events]
     return Columns(estimates[0].number, np.array([e.time_ns for e in estimates]), of, events)
 
 
-def _follow_compiled(
-    estimator: "CompiledEstimator", state: "CompiledState", rows: Rows
-) -> tuple["CompiledState", Columns]:
+def _follow_compiled(estimator: "CompiledEstimator", state: np.ndarray, rows: Rows) -> tuple[np.ndarray, Columns]:
     after, table = estimator.follow(state, rows.time_ns, rows.values)
     value = table[:, estimator.columns["parameters"]]
     if not isfinite(sum(value[-1].tolist())):  # what is not finite once stays so
@@ -118,11 +116,11 @@ def _follow_compiled(
     return after, _columns(estimator, state, rows, table)
 
 
-def _columns(estimator: "CompiledEstimator", state: "CompiledState", rows: Rows, table: np.ndarray) -> Columns:
+def _columns(estimator: "CompiledEstimator", state: np.ndarray, rows: Rows, table: np.ndarray) -> Columns:
     events = [
         (k, event)
         for k in table[:, estimator.columns["news"]].nonzero()[0].tolist()
-        for event in estimator.events(table[k], table[k - 1] if k else state.last_row, int(rows.time_ns[k]))
+        for event in estimator.events(table[k], table[k - 1] if k else state, int(rows.time_ns[k]))
     ]
     return Columns(rows.number, rows.time_ns, Parts(table, estimator.columns), events, Again(estimator, state, rows))
 
@@ -134,14 +132,15 @@ class Parts(Mapping):
         self.table, self.places = table, places
 
     def __getitem__(self, field: str) -> np.ndarray:
-        part = self.table[:, self.places["parameters" if field == "value" else field]]
+        name = SENT[field]
+        part = self.table[:, self.places[name]]
         if field == "covariance":
             side = isqrt(part.shape[1])
             return part.reshape(-1, side, side)
-        return part.astype(np.uint8) if field in ("status", "state") else part
+        return part.astype(np.uint8) if ROW[name].code else part
 
     def __iter__(self) -> Iterator[str]:
-        return iter((*FIELDS, "value", "std", "innovation_std"))
+        return iter(SENT)
 
     def __len__(self) -> int:
-        return len(FIELDS) + 3
+        return len(SENT)

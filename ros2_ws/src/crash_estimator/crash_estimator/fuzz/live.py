@@ -26,13 +26,13 @@ bodies:
 elements:
   spring: {between: [car, wall], stiffness: {estimate: true, initial: 1.0e5, min: 0.0}, displacement: travel}
 """
-KINDS = {"estimator": EstimatorNode, "diagnosis": DiagnosisNode}
+KINDS: dict[str, type[EstimatorNode] | type[DiagnosisNode]] = {"estimator": EstimatorNode, "diagnosis": DiagnosisNode}
 FOLLOWED = 10
 """Samples of the valid test that comes after each spoilt one."""
 
 
 @cache
-def node(kind: str) -> Node:
+def node(kind: str) -> EstimatorNode | DiagnosisNode:
     """Ready to hear; made once."""
     if not rclpy.ok():
         rclpy.init(domain_id=free_domain())

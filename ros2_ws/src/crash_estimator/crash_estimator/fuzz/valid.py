@@ -4,6 +4,7 @@ from array import array
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from crash_msgs.msg import (
@@ -24,6 +25,8 @@ from rclpy.serialization import serialize_message
 from crash_replay.bag import time_zero_ns, write_bag
 from crash_replay.recording import Channel, Recording, Test
 from crash_replay.ros_messages import samples_to_msg, test_to_msg
+
+from ..core.estimate import ROW, sent
 
 Files = dict[str, bytes]
 
@@ -174,17 +177,23 @@ TIME_ZERO = time_zero_ns(RECORDING)
 TEST_INFO, SAMPLES = test_to_msg(RECORDING), samples_to_msg(RECORDING, 3, 9, 1, TIME_ZERO)
 BLOCK = {"run": 1, "number": 3, "time_ns": array("q", [1, 2]), "model": "m", "method": "mrls"}
 FOUR = array("d", [1.0, 2.0, 3.0, 4.0])
+
+
+def _said(*of: str) -> dict[str, Any]:
+    """Fields of two samples of two."""
+    return {field: [0, 1, 2, 0] if ROW[name].code else FOUR for field, name in sent(*of).items()}
+
+
 OUTPUT = {
     "block/parameters": ParametersBlock(
-        **BLOCK, name=["a", "b"], unit=["N", "N"], value=FOUR, std=FOUR, status=[0, 1, 2, 3]
+        **BLOCK, name=["a", "b"], unit=["N", "N"], **_said("parameters")
     ),
     "block/residuals": ResidualsBlock(
-        **BLOCK, name=["a", "b"], unit=["N", "N"], measured=FOUR, predicted=FOUR, innovation=FOUR,
-        innovation_std=FOUR, residual=FOUR, residual_std=FOUR,
+        **BLOCK, name=["a", "b"], unit=["N", "N"], **_said("equations")
     ),
     "forces": Forces(
-        **BLOCK, element=["e", "f"], between=["a-b", "b-c"], crush=FOUR, rate=FOUR, force=FOUR, force_std=FOUR,
-        state=[0, 1, 2, 0], body=["a", "b"], mass=FOUR[:2], displacement=FOUR, velocity=FOUR, acceleration=FOUR,
+        **BLOCK, element=["e", "f"], between=["a-b", "b-c"], body=["a", "b"], mass=FOUR[:2],
+        **_said("elements", "bodies"),
     ),
     "events": Event(run=1, number=3, time=0.01, kind="loading", target="e", value=1.0, text="a line"),
     "diagnosis/ranking": Ranking(run=1, number=3, ranking=[RankedEffect(effect="x", target="e")], found=["x on e"]),

@@ -2,7 +2,7 @@
 
 from array import array
 from collections.abc import Iterator, Sequence
-from functools import lru_cache, partial
+from functools import lru_cache, partial, reduce
 from typing import TypeVar
 
 import numpy as np
@@ -11,7 +11,7 @@ from crash_msgs.msg import Event, Forces, ParametersBlock, ResidualsBlock
 from crash_replay.cdr import Serialized
 from crash_replay.ros_messages import stamp
 
-from ..core.estimate import Description, Estimate, ParameterStatus
+from ..core.estimate import ROW, Description, Estimate, ParameterStatus, as_sent, nothing_said, sent
 from ..following.columns import Columns
 
 Message = TypeVar("Message", ParametersBlock, ResidualsBlock, Forces)
@@ -63,11 +63,10 @@ class Tables:
     """A serialised message on so many samples, filled again."""
 
     def __init__(self, empty: Message, samples: int):
-        names, bodies = (len(getattr(empty, field)) for field in NAMES[type(empty)])
         empty.time_ns = array("q", bytes(8 * samples))
-        for field in FIELDS[type(empty)]:
-            count = samples * (bodies if field in OF_BODIES else names)
-            setattr(empty, field, array("B", bytes(count)) if field in BYTES else array("d", bytes(8 * count)))
+        for field, name in FIELDS[type(empty)].items():
+            count = samples * len(getattr(empty, NAMES[ROW[name].of]))
+            setattr(empty, field, array("B", bytes(count)) if ROW[name].code else array("d", bytes(8 * count)))
         self.message = Serialized(empty)
         numbers = self.message.numbers
         self.run, self.number, self.time_ns = numbers["run"], numbers["number"], numbers["time_ns"]
@@ -111,39 +110,22 @@ def estimates_from(
     by_kind = [
         {number: row for m in messages for number, row in _samples(m)} for messages in (parameters, residuals, forces)
     ]
-    estimates = []
-    for number in sorted(set.intersection(*(set(rows) for rows in by_kind))):
-        p, r, f = (rows[number] for rows in by_kind)
-        count = _parameters(p["status"], len(p["status"]))
-        estimates.append(
-            Estimate(
-                number=number,
-                time_ns=p["time_ns"],
-                parameters=p["value"][:count],
-                covariance=_diagonal(p["std"][:count]),
-                status=p["status"][:count],
-                extra=tuple(p["value"][count:].tolist()),
-                extra_std=tuple(p["std"][count:].tolist()),
-                innovation_covariance=_diagonal(r["innovation_std"]),
-                **{field: r[field] for field in ("measured", "predicted", "innovation", "residual", "residual_std")},
-                **{field: f[field] for field in ("crush", "rate", "force", "force_std", "state")},
-                **{field: f[field] for field in ("displacement", "velocity", "acceleration")},
-                events=(),
-            )
-        )
-    return estimates
+    numbers = sorted(set.intersection(*(set(rows) for rows in by_kind)))
+    if not numbers:
+        return []
+    nothing = nothing_said(description_from(parameters[0], residuals[0], forces[0]))
+    said = ((number, reduce(dict.__or__, (rows[number] for rows in by_kind))) for number in numbers)
+    return [as_sent(nothing, number, fields["time_ns"], fields, np.nan) for number, fields in said]
 
 
 FIELDS = {
-    ParametersBlock: ("value", "std", "status"),
-    ResidualsBlock: ("measured", "predicted", "innovation", "innovation_std", "residual", "residual_std"),
-    Forces: ("crush", "rate", "force", "force_std", "state", "displacement", "velocity", "acceleration"),
+    ParametersBlock: sent("parameters"),
+    ResidualsBlock: sent("equations"),
+    Forces: sent("elements", "bodies"),
 }
-"""Those with one row a sample."""
-NAMES = {ParametersBlock: ("name", "name"), ResidualsBlock: ("name", "name"), Forces: ("element", "body")}
-"""What a row has values of: most fields, those in OF_BODIES."""
-OF_BODIES = ("displacement", "velocity", "acceleration")
-BYTES = ("status", "state")
+"""Those with one row a sample, and what they are in an Estimate."""
+NAMES = {"parameters": "name", "equations": "name", "elements": "element", "bodies": "body"}
+"""Where a block has the names of what a row has values of."""
 
 
 def _samples(message: ParametersBlock | ResidualsBlock | Forces) -> Iterator[tuple[int, dict]]:
@@ -157,12 +139,6 @@ def _samples(message: ParametersBlock | ResidualsBlock | Forces) -> Iterator[tup
 def _parameters(status: Sequence[int], width: int) -> int:
     """How many of a sample's values are parameters of the model; the rest is of the method."""
     return width - int(np.count_nonzero(np.asarray(status[:width]) == ParameterStatus.METHOD))
-
-
-def _diagonal(std: np.ndarray) -> np.ndarray:
-    matrix = np.full((len(std), len(std)), np.nan)
-    np.fill_diagonal(matrix, std**2)
-    return matrix
 
 
 def _ends(between: str, bodies: tuple[str, ...]) -> tuple[str, str]:

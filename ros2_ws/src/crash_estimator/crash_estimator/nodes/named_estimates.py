@@ -5,7 +5,7 @@ They are made only while somebody listens, and hold the same numbers to the last
 """
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from fnmatch import fnmatchcase
 
 from crash_msgs.msg import Equation, Parameter, Parameters, ParametersBlock, Residuals, ResidualsBlock
@@ -81,7 +81,7 @@ class NamedMessages:
 class Entries:
     """A serialised message with named entries, filled again for each sample."""
 
-    def __init__(self, empty: Parameters | Residuals, entries: str, fields: Sequence[str]):
+    def __init__(self, empty: Parameters | Residuals, entries: str, fields: Iterable[str]):
         empty.header.frame_id = empty.model
         self.message = Serialized(empty)
         numbers = self.message.numbers

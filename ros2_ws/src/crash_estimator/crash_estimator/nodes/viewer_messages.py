@@ -1,5 +1,7 @@
 """crash_msgs -> the viewer's blocks: the one file of the viewer that knows both worlds."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from crash_msgs.msg import (
     Event,
@@ -16,7 +18,7 @@ from crash_msgs.msg import (
 from crash_replay.foreign_text import visible
 from crash_replay.recording import RecordingError
 
-from ..viewer.blocks import EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock, speaker
+from ..viewer.blocks import EventBlock, ForceBlock, ParameterBlock, ResidualBlock, TestBlock, said_of, speaker
 from ..viewer.findings import Candidate, MisfitBlock, RankingBlock, RevisionBlock, Window
 
 
@@ -31,14 +33,14 @@ def parameter_block(estimator: str, message: ParametersBlock) -> ParameterBlock:
         *_head(estimator, message),
         names,
         tuple(message.unit),
-        **_tables(message, len(names), ("value", "std", "status")),
+        **_tables(message, len(names), said_of(ParameterBlock)),
     )
 
 
 def residual_block(estimator: str, message: ResidualsBlock) -> ResidualBlock:
     names = tuple(message.name)
-    fields = ("measured", "predicted", "innovation", "innovation_std", "residual", "residual_std")
-    return ResidualBlock(*_head(estimator, message), names, tuple(message.unit), **_tables(message, len(names), fields))
+    said = _tables(message, len(names), said_of(ResidualBlock))
+    return ResidualBlock(*_head(estimator, message), names, tuple(message.unit), **said)
 
 
 def force_block(estimator: str, message: Forces) -> ForceBlock:
@@ -49,8 +51,8 @@ def force_block(estimator: str, message: Forces) -> ForceBlock:
         tuple(message.between),
         bodies,
         np.asarray(message.mass),
-        **_tables(message, len(elements), ("crush", "force", "state", "rate")),
-        **_tables(message, len(bodies), ("velocity", "acceleration", "displacement")),
+        **_tables(message, len(elements), said_of(ForceBlock, "elements")),
+        **_tables(message, len(bodies), said_of(ForceBlock, "bodies")),
     )
 
 
@@ -131,7 +133,7 @@ def _head(estimator: str, message: ParametersBlock | ResidualsBlock | Forces) ->
 
 
 def _tables(
-    message: ParametersBlock | ResidualsBlock | Forces | Revision, width: int, fields: tuple[str, ...]
+    message: ParametersBlock | ResidualsBlock | Forces | Revision, width: int, fields: Sequence[str]
 ) -> dict[str, np.ndarray]:
     """Fields of n x width values, sent row by row. Raises RecordingError where a length does not fit."""
     n = len(message.time_ns)

@@ -1,13 +1,15 @@
 """What the viewer is given: blocks of an estimator's output as arrays. Neither ROS nor Rerun here.
 
 A block holds n consecutive samples; its `estimator` says who speaks, which is each revision of a model for itself; its
-fields in `over_time` have n rows. SI units, as in crash_msgs.
+`time_ns` and what is `said_of` each sample have n rows. SI units, as in crash_msgs.
 """
 
 from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
+
+from ..core.estimate import sent
 
 
 class TestBlock(NamedTuple):
@@ -57,8 +59,6 @@ class ParameterBlock(NamedTuple):
     std: np.ndarray  # (n, p)
     status: np.ndarray  # (n, p) ParameterStatus
 
-    over_time = ("time_ns", "value", "std", "status")
-
 
 class ResidualBlock(NamedTuple):
     """n samples of q equations; NaN where there is no valid measurement."""
@@ -77,8 +77,6 @@ class ResidualBlock(NamedTuple):
     innovation_std: np.ndarray
     residual: np.ndarray
     residual_std: np.ndarray
-
-    over_time = ("time_ns", "measured", "predicted", "innovation", "innovation_std", "residual", "residual_std")
 
 
 class ForceBlock(NamedTuple):
@@ -102,8 +100,6 @@ class ForceBlock(NamedTuple):
     rate: np.ndarray  # (n, e) m/s, of crush
     displacement: np.ndarray  # (n, b) m
 
-    over_time = ("time_ns", "crush", "force", "state", "velocity", "acceleration", "rate", "displacement")
-
 
 class EventBlock(NamedTuple):
     """One event."""
@@ -119,6 +115,12 @@ class EventBlock(NamedTuple):
 
 Block = ParameterBlock | ResidualBlock | ForceBlock
 """A stretch of samples from one estimator."""
+
+
+def said_of(block: Block | type[Block], *of: str) -> list[str]:
+    """Its fields with a row a sample, as they are called in the messages; of: only what is of parameters, ..."""
+    fields = sent(*(of or ("parameters", "equations", "elements", "bodies")))
+    return [field for field in block._fields if field in fields]
 
 
 def join(blocks: Iterable[Block]) -> list[Block]:
@@ -137,4 +139,5 @@ def _joined(group: list[Block]) -> Block:
     first = group[0]
     if len(group) == 1:
         return first
-    return first._replace(**{name: np.concatenate([getattr(b, name) for b in group]) for name in first.over_time})
+    over_time = ("time_ns", *said_of(first))
+    return first._replace(**{name: np.concatenate([getattr(b, name) for b in group]) for name in over_time})

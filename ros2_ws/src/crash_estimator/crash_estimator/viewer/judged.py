@@ -1,16 +1,16 @@
 """Blocks -> estimates again, and what the validation says of them (thesis 3.7). Neither ROS nor Rerun here."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
 
-from ..core.estimate import Description, Estimate, ParameterStatus
+from ..core.estimate import Description, Estimate, ParameterStatus, as_sent, nothing_said
 from ..core.free_run import Comparison, FreeRun, compare, free_run
 from ..core.structure import ModelError, Structure
 from ..core.validation import Validation, validate
-from .blocks import Block, ForceBlock, ParameterBlock, ResidualBlock, estimator_of, join, revision_of
+from .blocks import Block, ForceBlock, ParameterBlock, ResidualBlock, estimator_of, join, revision_of, said_of
 
 MOST = 20_000
 """Samples; of a longer recording nothing is judged here: a viewer must not work for minutes."""
@@ -58,10 +58,17 @@ class Jury:
 
 def judge(structure: Structure, blocks: list[Block]) -> Judged | None:
     """All blocks of one estimator in one pass; None where they do not belong to the structure."""
-    kinds: Mapping[type, Block] = {type(block): block for block in join(blocks)}
-    if kinds.keys() != {ParameterBlock, ResidualBlock, ForceBlock}:
+    parameters = residuals = forces = None
+    for block in join(blocks):
+        match block:
+            case ParameterBlock():
+                parameters = block
+            case ResidualBlock():
+                residuals = block
+            case ForceBlock():
+                forces = block
+    if parameters is None or residuals is None or forces is None:
         return None
-    parameters, residuals, forces = kinds[ParameterBlock], kinds[ResidualBlock], kinds[ForceBlock]
     fits = tuple(element.name for element in structure.elements) == forces.element
     if not fits:
         return None
@@ -87,7 +94,7 @@ def describe(parameters: ParameterBlock, residuals: ResidualBlock, forces: Force
         equations=residuals.name,
         equation_units=residuals.unit,
         elements=forces.element,
-        between=tuple(tuple(ends.split("-", 1)) for ends in forces.between),
+        between=tuple((one, other) for one, _, other in (ends.partition("-") for ends in forces.between)),
         bodies=forces.body,
         masses=tuple(forces.mass),
     )
@@ -95,34 +102,18 @@ def describe(parameters: ParameterBlock, residuals: ResidualBlock, forces: Force
 
 def estimates_of(parameters: ParameterBlock, residuals: ResidualBlock, forces: ForceBlock) -> list[Estimate]:
     """Samples that all three tell of; of the covariances only the diagonals are known."""
-    common = reduce(np.intersect1d, (parameters.time_ns, residuals.time_ns, forces.time_ns))
-    own = _own(parameters)
-    p, r, f = (np.searchsorted(block.time_ns, common) for block in (parameters, residuals, forces))
+    blocks: list[Block] = [parameters, residuals, forces]
+    common = reduce(np.intersect1d, (block.time_ns for block in blocks))
+    places = zip(*(np.searchsorted(block.time_ns, common) for block in blocks), strict=True)
+    nothing = nothing_said(describe(parameters, residuals, forces))
+    fields = [(getattr(block, field), which, field) for which, block in enumerate(blocks) for field in said_of(block)]
     return [
-        Estimate(
-            number=parameters.number + int(i),
-            time_ns=int(time_ns),
-            parameters=parameters.value[i, :own],
-            covariance=np.diag(parameters.std[i, :own] ** 2),
-            status=parameters.status[i, :own],
-            measured=residuals.measured[j],
-            predicted=residuals.predicted[j],
-            innovation=residuals.innovation[j],
-            innovation_covariance=np.diag(residuals.innovation_std[j] ** 2),
-            residual=residuals.residual[j],
-            residual_std=residuals.residual_std[j],
-            crush=forces.crush[k],
-            rate=forces.rate[k],
-            force=forces.force[k],
-            force_std=np.full_like(forces.force[k], np.nan),
-            state=forces.state[k],
-            displacement=forces.displacement[k],
-            velocity=forces.velocity[k],
-            acceleration=forces.acceleration[k],
-            events=(),
+        as_sent(
+            nothing, parameters.number + int(rows[0]), time_ns,
+            {field: table[rows[which]] for table, which, field in fields}, elsewhere=0.0,
         )
-        for time_ns, i, j, k in zip(common, p, r, f)
-    ]
+        for time_ns, rows in zip(common.tolist(), places, strict=True)
+    ]  # fmt: skip
 
 
 def _own(parameters: ParameterBlock) -> int:

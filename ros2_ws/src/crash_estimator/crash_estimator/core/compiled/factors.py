@@ -15,16 +15,27 @@ from numba import njit
 
 
 @njit(cache=True, inline="always")
+def through(factors, psi, out):
+    """Fill out (n,) with  U' psi'. Most of psi is 0: an equation sees few parameters."""
+    n = len(psi)
+    for j in range(n):
+        out[j] = psi[j]
+    for i in range(n):
+        if psi[i] != 0.0:
+            for j in range(i + 1, n):
+                out[j] += factors[j, i] * psi[i]
+
+
+@njit(cache=True, inline="always")
 def observe(factors, psi, r, spread):
     """P - (P psi') (P psi')' / s  in place, s = psi P psi' + r, for one equation -> s; spread (n,) becomes P psi'.
 
     With f = U' psi', s grows from r by D_j f_j^2 for each j, and D_j is multiplied by s before over s after (Bierman).
     """
+    through(factors, psi, spread)
     s = r
     for j in range(len(psi)):
-        f = psi[j]
-        for i in range(j):
-            f += factors[j, i] * psi[i]
+        f = spread[j]
         before, part = s, factors[j, j] * f
         spread[j] = part
         if part * f == 0.0:
@@ -84,17 +95,14 @@ def product_of(factors, covariance):
 
 
 @njit(cache=True, inline="always")
-def seen_through(factors, gradient, noise, through, out):
-    """Fill out (q, q) with  Psi P Psi' + R2  of noise (q,), Psi = gradient (q, n), and through (q, n) with Psi U."""
+def seen_through(factors, gradient, noise, rotated, out):
+    """Fill out (q, q) with  Psi P Psi' + R2  of noise (q,), Psi = gradient (q, n), and rotated (q, n) with Psi U."""
     q, n = gradient.shape
     for i in range(q):
-        for j in range(n):
-            through[i, j] = gradient[i, j]
-            for h in range(j):
-                through[i, j] += factors[j, h] * gradient[i, h]
+        through(factors, gradient[i], rotated[i])
         for k in range(i + 1):
             total = noise[i] if i == k else 0.0
             for j in range(n):
-                total += through[i, j] * factors[j, j] * through[k, j]
+                total += rotated[i, j] * factors[j, j] * rotated[k, j]
             out[i, k] = total
             out[k, i] = total

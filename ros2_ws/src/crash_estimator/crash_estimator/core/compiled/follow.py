@@ -8,71 +8,68 @@ from .kalman import kalman_step
 from .motion import APART, UNLOADING, move, regress, touch
 from .regressor_errors import known_of, move_on, sensors_of
 from .rls import rls_step
-from .views import method_of, plan_views, row_views, size_of, state_views
+from .views import method_of, plan_views, row_views, scratch_views, size_of, state_views
 
 ESTIMATED, KNOWN, UNLOADS, SEPARATE, CLAMPED, _ = (float(status) for status in ParameterStatus)
 
 
 @njit(cache=True)
-def follow(whole, others, state, last_row, times_ns, values, rows):
-    """Fold (k, c) values at (k,) times through the method; (k, row) `rows` are filled.
+def follow(whole, others, state, times_ns, values, rows):
+    """Fold (k, c) values at (k,) times through the method; `rows` (k, ...) are filled.
 
-    `state` and `last_row`, the row before them, are changed in place.
+    `state`, which begins with the row before them, is changed in place.
     """
     n, method = size_of(whole), method_of(others)
-    plan, s = plan_views(whole, others, n), state_views(state, n)
-    p, q, e = n.estimated, n.equations, n.elements
-    by_errors, errors = np.zeros((3, q, n.bodies)), np.zeros((n.bodies, 7))
-    zero, density = np.zeros(n.bodies), np.zeros(n.bodies)
-    clean, bodies = np.empty(n.channels), np.empty(n.bodies)
-    lever, shift, per_unit = np.empty(e), np.empty(e), np.empty(n.parameters)
-    known, gradient, learnt, target = np.empty(q), np.empty((q, p + n.offsets)), np.empty(q), np.empty(q)
-    active, walk = np.ones(p + n.offsets), np.empty(p)
-    clamped, before = np.empty(p + n.offsets), np.empty(p + n.offsets)
-    latest = np.empty(len(last_row))
-    row, previous = row_views(latest, n), row_views(last_row, n)
+    plan = plan_views(whole[len(n) :], others[len(method) :], n)
+    s = state_views(state[rows.shape[1] :], n)
+    latest, last_row = np.zeros(rows.shape[1]), state[: rows.shape[1]]
+    row, previous, w = row_views(latest, n), row_views(last_row, n), scratch_views(n)
+    w.active[:] = 1.0
     for t in range(len(times_ns)):
         time = times_ns[t] * 1e-9
-        dt = move(plan, s, row, times_ns[t], values[t], clean, bodies)
-        touch(plan, s, row, time, lever, shift)
-        sensors_of(plan, s, zero, density, dt)
-        known_of(zero, density, plan.velocity_variance, time, errors)
-        excited = regress(
-            plan, s, row, n, dt, time, lever, shift, per_unit, by_errors, errors, known, gradient, active, walk, learnt
-        )
-        before[:] = s.theta
-        clamped[:] = 0.0
+        dt = move(plan, s, row, times_ns[t], values[t], w)
+        touch(plan, s, row, time, w)
+        sensors_of(plan, s, w.zero, w.density, dt)
+        known_of(w.zero, w.density, plan.velocity_variance, time, w.errors)
+        excited = regress(plan, s, row, n, dt, time, w)
+        w.before[:] = s.theta
+        w.clamped[:] = 0.0
         row.rewinds[0] = 0.0
         if dt > 0.0 and excited:
             for b in range(n.offsets):
                 if s.squares[b] > 0.0:  # its zero is estimated
-                    zero[b] = 0.0
-            known_of(zero, density, plan.velocity_variance, time, errors)
+                    w.zero[b] = 0.0
+            known_of(w.zero, w.density, plan.velocity_variance, time, w.errors)
             move_on(s, time)
             if method.is_kalman:
-                kalman_step(
-                    plan, method, n, s, row, dt, known, gradient, by_errors, errors, active, walk, learnt, target,
-                    clamped,
-                )  # fmt: skip
+                kalman_step(plan, method, n, s, row, dt, w)
             else:
-                rls_step(
-                    plan, method, s, row, dt, known, gradient, by_errors, errors, active, walk, learnt, target, clamped
-                )
+                rls_step(plan, method, s, row, dt, w)
         else:
-            gradient[:, p:] = 0.0  # nothing is expected of the zero offsets' errors without an update
+            w.gradient[:, n.estimated :] = 0.0  # nothing is expected of the zero offsets' errors without an update
             row.innovation_covariance[:, :] = 0.0
-            for i in range(q):
-                row.innovation_covariance[i, i] = learnt[i] if learnt[i] == learnt[i] else 0.0
-                row.residual_std[i] = np.sqrt(learnt[i])
-        _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped)
+            for i in range(n.equations):
+                row.innovation_covariance[i, i] = w.learnt[i] if w.learnt[i] == w.learnt[i] else 0.0
+                row.residual_std[i] = np.sqrt(w.learnt[i])
+        _report(plan, n, s, row, w)
         row.news[0] = _news(row, previous)
         last_row[:] = latest
         rows[t] = latest
 
 
+@njit(cache=True)
+def step(whole, others, before, after, time_ns, values, row):
+    """`follow` for one sample of (c,) values: fills the state after it, which begins with its row of that length."""
+    after[:] = before
+    times = np.empty(1, dtype=np.int64)
+    times[0] = time_ns
+    follow(whole, others, after, times, values.reshape((1, len(values))), after[:row].reshape((1, row)))
+
+
 @njit(cache=True, inline="always")
-def _report(plan, n, s, row, per_unit, shift, known, gradient, before, clamped):
+def _report(plan, n, s, row, w):
     """Write the estimate: what the parameters now predict, and how sure that is."""
+    per_unit, shift, known, gradient, before, clamped = w.per_unit, w.shift, w.known, w.gradient, w.before, w.clamped
     p, q = len(s.theta), len(known)
     for j in range(len(per_unit)):
         k, slot = plan.element[j], plan.slot[j]

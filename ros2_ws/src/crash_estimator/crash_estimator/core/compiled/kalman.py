@@ -32,15 +32,14 @@ def kalman_update(theta, factors, noise, gradient, target, active, lower, upper,
     where estimated; lower, upper: bounds of the first of them; clamped (p,) is set to 1.0 where one is held at its
     bound; gain (p, q) is filled with that of each equation in its turn.
     """
-    start = theta.copy()
-    prior = factors.copy()
-    free = active.copy()
-    clamped[:] = 0.0
-    psi = np.empty(len(theta))
-    spread = np.empty(len(theta))
+    p = len(theta)
+    room = np.empty((p + 4, p))  # one piece of memory is found sooner than five
+    start, free, psi, spread, prior = room[0], room[1], room[2], room[3], room[4:]
+    for j in range(p):
+        start[j], free[j], clamped[j] = theta[j], active[j], 0.0
+        for k in range(p):
+            prior[j, k] = factors[j, k]
     while True:
-        theta[:] = start
-        factors[:] = prior
         gain[:, :] = 0.0
         for i in range(len(target)):
             if target[i] == target[i]:
@@ -55,6 +54,8 @@ def kalman_update(theta, factors, noise, gradient, target, active, lower, upper,
                     again = True
         if not again:
             break
+        theta[:] = start
+        factors[:] = prior
 
 
 @njit(cache=True, inline="always")
@@ -77,6 +78,14 @@ def _one_equation(theta, factors, r, gradient, target, free, clamped, psi, sprea
     add_square(factors, 1.0 / s, spread, last)
 
 
+class Limits(NamedTuple):
+    """What a parameter may be, and how large it is. (To hand on a whole plan takes a microsecond.)"""
+
+    lower: np.ndarray  # (p,)
+    upper: np.ndarray  # (p,)
+    scale: np.ndarray  # (p,)
+
+
 class Filter(NamedTuple):
     """What one filter has of the state; w: its parameters, and errors of zero offsets."""
 
@@ -88,9 +97,7 @@ class Filter(NamedTuple):
 
 
 @njit(cache=True, inline="always")
-def kalman_step(
-    plan, method, n, s, row, dt, known, gradient, by_errors, errors, active, walk, learnt, target, clamped
-):  # fmt: skip
+def kalman_step(plan, method, n, s, row, dt, w):
     """The zero offsets' errors where they are estimated, and a step of the filter."""
     if n.offsets and np.isnan(s.noise[0]):
         count = s.count.max()
@@ -99,72 +106,69 @@ def kalman_step(
             s.factors[n.estimated + b, n.estimated + b] = variance
             if count >= FEWEST:
                 s.beside[n.estimated + b, n.estimated + b] = s.squares[b] / count**2 - variance
-    for i in range(len(known)):
-        target[i] = row.measured[i] - known[i]
-    filtered(
-        plan, method, Filter(s.theta, s.factors, s.noise, s.beside, s.beside_shared), dt, gradient, by_errors, errors,
-        active, walk, learnt, target, clamped, row.innovation_covariance, row.residual_std,
-    )  # fmt: skip
+    for i in range(n.equations):
+        w.target[i] = row.measured[i] - w.known[i]
+    limits = Limits(plan.lower, plan.upper, plan.scale)
+    both = Filter(s.theta, s.factors, s.noise, s.beside, s.beside_shared)
+    filtered(limits, method, both, dt, w, w.clamped, row.innovation_covariance, row.residual_std)
     product_of(s.factors, s.covariance)
     for j in range(n.estimated):
         for k in range(n.estimated):
             s.stated[j, k] = s.covariance[j, k] + s.beside[j, k]
 
 
-@njit(cache=True)
-def filtered(
-    plan, method, f, dt, gradient, by_errors, errors, active, walk, learnt, target, clamped, innovation_covariance,
-    residual_std,
-):  # fmt: skip
-    """Random walk, update, and adaptation of R2 to what the model cannot follow."""
-    p, q = len(f.theta), len(target)
-    unit, through = np.empty(p), np.empty((q, p))
-    for j in range(len(walk)):
-        size = max(abs(f.theta[j]), SMALLEST_SHARE * plan.scale[j])
-        if walk[j] > 0.0:
-            widen(f.factors, walk[j] * size**2, j, unit)
+@njit(cache=True, inline="always")
+def filtered(limits, method, f, dt, w, clamped, innovation_covariance, residual_std):
+    """Random walk, update, and adaptation of R2 to what the model cannot follow; w: `layout.SCRATCH`."""
+    p, q = len(f.theta), len(w.target)
+    for j in range(len(w.walk)):
+        size = max(abs(f.theta[j]), SMALLEST_SHARE * limits.scale[j])
+        if w.walk[j] > 0.0:
+            widen(f.factors, w.walk[j] * size**2, j, w.unit)
     for i in range(q):
         if np.isnan(f.noise[i]):
-            f.noise[i] = learnt[i] if learnt[i] == learnt[i] else 1.0
-    seen_through(f.factors, gradient, f.noise, through, innovation_covariance)
-    before, gain = f.theta.copy(), np.empty((p, q))
+            f.noise[i] = w.learnt[i] if w.learnt[i] == w.learnt[i] else 1.0
+    seen_through(f.factors, w.gradient, f.noise, w.through, innovation_covariance)
+    for j in range(p):
+        w.unfiltered[j] = f.theta[j]
     kalman_update(
-        f.theta, f.factors, f.noise, gradient, target, active, plan.lower, plan.upper, method.constrained, clamped, gain
-    )
+        f.theta, f.factors, f.noise, w.gradient, w.target, w.active, limits.lower, limits.upper, method.constrained,
+        clamped, w.gain,
+    )  # fmt: skip
     for i in range(q):
-        if target[i] == target[i]:
-            pass_one(f.beside, f.shared, gain[:, i], gradient[i], by_errors[:, i], errors, unit)
-    _left(f, gradient, gain, target, through, residual_std)
+        if w.target[i] == w.target[i]:
+            pass_one(f.beside, f.shared, w.gain[:, i], w.gradient[i], w.by_errors[:, i], w.errors, w.unit)
+    _left(f, w, residual_std)
     if method.noise_memory > 0.0:
         share = dt / (dt + method.noise_memory)
         for i in range(q):
-            residual, innovation = target[i], target[i]
+            residual, innovation, learnt = w.target[i], w.target[i], w.learnt[i]
             for j in range(p):
-                residual -= gradient[i, j] * f.theta[j]
-                innovation -= gradient[i, j] * before[j]
+                residual -= w.gradient[i, j] * f.theta[j]
+                innovation -= w.gradient[i, j] * w.unfiltered[j]
             product = residual * innovation
             if product == product:
                 f.noise[i] += share * (max(product, 0.0) - f.noise[i])
-            f.noise[i] = max(f.noise[i], learnt[i] if learnt[i] == learnt[i] else QUIETEST**2)
+            f.noise[i] = max(f.noise[i], learnt if learnt == learnt else QUIETEST**2)
 
 
-@njit(cache=True)
-def _left(f, gradient, gain, target, through, residual_std):
-    """`residual_variance` of estimators/update.py, its root; gain (w, q) becomes the influence of each equation."""
-    q, w = gradient.shape
-    spread = np.empty((q, q))
-    seen_through(f.factors, gradient, f.noise, through, spread)  # R2 is in it
+@njit(cache=True, inline="always")
+def _left(f, w, residual_std):
+    """`residual_variance` of estimators/update.py, its root; the gain becomes the influence of each equation."""
+    q, p = w.gradient.shape
+    gain = w.gain
+    seen_through(f.factors, w.gradient, f.noise, w.through, w.spread)  # R2 is in it
     for i in range(q):
-        if target[i] != target[i]:
+        if w.target[i] != w.target[i]:
             continue
         for k in range(i):
             met = 0.0
-            for j in range(w):
-                met += gradient[i, j] * gain[j, k]
-            for j in range(w):
+            for j in range(p):
+                met += w.gradient[i, j] * gain[j, k]
+            for j in range(p):
                 gain[j, k] -= gain[j, i] * met
     for i in range(q):
         own = 0.0
-        for j in range(w):
-            own += gradient[i, j] * gain[j, i]
-        residual_std[i] = np.sqrt(max(spread[i, i] - 2.0 * own * f.noise[i], 0.0))
+        for j in range(p):
+            own += w.gradient[i, j] * gain[j, i]
+        residual_std[i] = np.sqrt(max(w.spread[i, i] - 2.0 * own * f.noise[i], 0.0))

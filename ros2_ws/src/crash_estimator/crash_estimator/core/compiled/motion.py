@@ -13,11 +13,12 @@ LOADING, UNLOADING, APART = (float(state) for state in ElementState)
 
 
 @njit(cache=True, inline="always")
-def move(plan, s, row, time_ns, raw, values, bodies_now):
+def move(plan, s, row, time_ns, raw, w):
     """Integrate the bodies' motion and the elements' crush by one sample -> dt in s (0 before the impact).
 
-    values (c,) and bodies_now (b,) are scratch. Writes the motion to the state and to the row.
+    Writes the motion to the state and to the row; w: `layout.SCRATCH`.
     """
+    values, bodies_now = w.clean, w.now
     before = time_ns < 0
     if before:
         for c in range(len(raw)):
@@ -29,7 +30,7 @@ def move(plan, s, row, time_ns, raw, values, bodies_now):
     started = s.clock[0] >= 0.0
     dt = 0.0 if before else (time_ns - max(s.clock[0], 0.0)) * 1e-9
     for k in range(len(bodies_now)):
-        first, last = plan.first_channel[k], plan.first_channel[k + 1]
+        first, last = plan.first_channel[k], plan.last_channel[k]
         total, valid = 0.0, 0
         for j in range(first, last):
             value = values[plan.body_channels[j]]
@@ -78,8 +79,9 @@ def move(plan, s, row, time_ns, raw, values, bodies_now):
 
 
 @njit(cache=True, inline="always")
-def touch(plan, s, row, time, lever, shift):
+def touch(plan, s, row, time, w):
     """Loading, unloading or apart; the springs' force is K lever + shift."""
+    lever, shift = w.lever, w.shift
     for k in range(len(lever)):
         if time < 0.0:
             lever[k] = shift[k] = 0.0
@@ -106,15 +108,15 @@ def touch(plan, s, row, time, lever, shift):
 
 
 @njit(cache=True, inline="always")
-def regress(
-    plan, s, row, n, dt, time, lever, shift, per_unit, by_errors, errors, known, gradient, active, walk, noise
-):  # fmt: skip
+def regress(plan, s, row, n, dt, time, w):
     """Fill the regression of this sample -> whether it says anything about an estimated parameter.
 
     per_unit (all,) is each parameter's force for one unit of it, by_errors (3, q, b) each equation's change for an
     error of a body's zero, velocity and displacement; the others are as in `regression.Regression`, gradient with the
     offsets' columns at its end.
     """
+    lever, shift, per_unit, known, gradient = w.lever, w.shift, w.per_unit, w.known, w.gradient
+    by_errors, errors, active, walk, noise = w.by_errors, w.errors, w.active, w.walk, w.learnt
     q = len(known)
     before_impact = s.count.max() if len(s.count) else 0.0
     for i in range(q):
@@ -183,7 +185,7 @@ def regress(
 
 @njit(cache=True, inline="always")
 def value_of(value, slot, theta, j):
-    """The parameter's known or latest value. (It takes arrays: to hand on all of a plan takes a microsecond.)"""
+    """The parameter's known or latest value."""
     return value[j] if slot[j] < 0 else theta[slot[j]]
 
 

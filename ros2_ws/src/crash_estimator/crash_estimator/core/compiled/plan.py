@@ -10,42 +10,67 @@ from ..estimators.rls import Rls
 from ..estimators.update import Theta
 from ..kinematics import Kinematics
 from ..regression import Regressor
-from .layout import Size
+from .layout import Shapes, Size
 
 
 class Plan(NamedTuple):
-    """Who is measured by what, and who pushes whom. c channels, b bodies, e elements, q equations;
-    all parameters for those of the model, p for those that are estimated. The whole numbers come first."""
+    """Who is measured by what, and who pushes whom. The whole numbers come first."""
 
-    first_channel: np.ndarray  # (b + 1,) of body k: body_channels[first_channel[k] : first_channel[k + 1]]
-    has_offset: np.ndarray  # (c,) 1: yes
-    ends: np.ndarray  # (e, 2)
-    crush_channel: np.ndarray  # (e,) -1: integrated
-    rate_channel: np.ndarray  # (e,) -1: integrated, or derived from a measured crush
-    equation_body: np.ndarray  # (q,) -1: a measured force
-    force_channel: np.ndarray  # (q,) -1: a balance
-    compression_only: np.ndarray  # (e,) 1: yes
-    element: np.ndarray  # (all,)
-    is_stiffness: np.ndarray  # (all,) 1: yes
-    slot: np.ndarray  # (all,) place among the estimated ones, -1: known
-    stiffness: np.ndarray  # (e,) which of all is the element's stiffness
-    damping: np.ndarray  # (e,) which of all is the element's damping
-    body_channels: np.ndarray  # as many as there are
-    initial_displacement: np.ndarray  # (b,)
-    initial_velocity: np.ndarray  # (b,)
-    share: np.ndarray  # (q, e)
-    unloading: np.ndarray  # (e,) 0: elastic
-    value: np.ndarray  # (all,) known or initial
-    given_noise: np.ndarray  # (q,) variance; NaN: from before the impact
-    drift_squared: np.ndarray  # (p,)
-    initial: np.ndarray  # (p,)
-    std: np.ndarray  # (p,)
-    lower: np.ndarray  # (p,)
-    upper: np.ndarray  # (p,)
-    scale: np.ndarray  # (p,)
-    own_offset: np.ndarray  # (q, b) 1 where the equation is that body's
-    crush_of_body: np.ndarray  # (e, b) d(crush) / d(displacement) where it is integrated, else 0
-    velocity_variance: np.ndarray  # (b,) of the initial velocity
+    first_channel: np.ndarray  # of body k: body_channels[first_channel[k] : last_channel[k]]
+    last_channel: np.ndarray
+    body_channels: np.ndarray
+    has_offset: np.ndarray  # 1: yes
+    ends: np.ndarray
+    crush_channel: np.ndarray  # -1: integrated
+    rate_channel: np.ndarray  # -1: integrated, or derived from a measured crush
+    equation_body: np.ndarray  # -1: a measured force
+    force_channel: np.ndarray  # -1: a balance
+    compression_only: np.ndarray  # 1: yes
+    element: np.ndarray
+    is_stiffness: np.ndarray  # 1: yes
+    slot: np.ndarray  # place among the estimated ones, -1: known
+    stiffness: np.ndarray  # which of all is the element's stiffness
+    damping: np.ndarray  # which of all is the element's damping
+    initial_displacement: np.ndarray
+    initial_velocity: np.ndarray
+    share: np.ndarray
+    unloading: np.ndarray  # 0: elastic
+    value: np.ndarray  # known or initial
+    given_noise: np.ndarray  # variance; NaN: from before the impact
+    drift_squared: np.ndarray
+    initial: np.ndarray
+    std: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    scale: np.ndarray
+    own_offset: np.ndarray  # 1 where the equation is that body's
+    crush_of_body: np.ndarray  # d(crush) / d(displacement) where it is integrated, else 0
+    velocity_variance: np.ndarray  # of the initial velocity
+
+
+WHOLE: Shapes = {
+    **dict.fromkeys(("first_channel", "last_channel"), ("bodies",)),
+    "body_channels": ("accelerometers",),
+    "has_offset": ("channels",),
+    "ends": ("elements", 2),
+    **dict.fromkeys(("crush_channel", "rate_channel"), ("elements",)),
+    **dict.fromkeys(("equation_body", "force_channel"), ("equations",)),
+    "compression_only": ("elements",),
+    **dict.fromkeys(("element", "is_stiffness", "slot"), ("parameters",)),
+    **dict.fromkeys(("stiffness", "damping"), ("elements",)),
+}
+OTHERS: Shapes = {
+    **dict.fromkeys(("initial_displacement", "initial_velocity"), ("bodies",)),
+    "share": ("equations", "elements"),
+    "unloading": ("elements",),
+    "value": ("parameters",),
+    "given_noise": ("equations",),
+    **dict.fromkeys(("drift_squared", "initial", "std", "lower", "upper", "scale"), ("estimated",)),
+    "own_offset": ("equations", "bodies"),
+    "crush_of_body": ("elements", "bodies"),
+    "velocity_variance": ("bodies",),
+}
+"""The shapes of a Plan's parts, in its order."""
 
 
 class MethodPlan(NamedTuple):
@@ -70,9 +95,13 @@ def make_plan(kinematics: Kinematics, contact: Contact, regressor: Regressor, se
     structure = kinematics.structure
     e, q = len(structure.elements), len(structure.equations)
     estimated = regressor.estimated
-    per_body = [columns for _, columns in kinematics.accelerometers]
+    listed = [column for _, columns in kinematics.accelerometers for column in columns]
+    counts = np.array([len(columns) for _, columns in kinematics.accelerometers], dtype=np.int64)
+    last_channel = np.cumsum(counts)
     return Plan(
-        first_channel=np.cumsum([0, *[len(columns) for columns in per_body]]),
+        first_channel=last_channel - counts,
+        last_channel=last_channel,
+        body_channels=np.array(listed, dtype=np.int64),
         has_offset=kinematics.offsets,
         ends=structure.ends,
         crush_channel=_placed(kinematics.crush_channels, e),
@@ -85,7 +114,6 @@ def make_plan(kinematics: Kinematics, contact: Contact, regressor: Regressor, se
         slot=np.where(estimated, np.cumsum(estimated) - 1, -1),
         stiffness=regressor.stiffness_index,
         damping=regressor.damping_index,
-        body_channels=np.array([column for columns in per_body for column in columns], dtype=np.int64),
         initial_displacement=kinematics.initial_displacement,
         initial_velocity=kinematics.initial_velocity,
         share=regressor.share,
@@ -109,8 +137,7 @@ def flat(size: Size, method: MethodPlan, plan: Plan) -> tuple[np.ndarray, np.nda
 
     `views` has the way back.
     """
-    first = Plan._fields.index("initial_displacement")
-    whole, others = ([np.ravel(part) for part in parts] for parts in (plan[:first], plan[first:]))
+    whole, others = ([np.ravel(getattr(plan, part)) for part in parts] for parts in (WHOLE, OTHERS))
     return np.concatenate([size, *whole]).astype(np.int64), np.concatenate([method, *others]).astype(np.float64)
 
 
@@ -131,16 +158,19 @@ def make_method_plan(method: Kalman | Rls) -> MethodPlan:
 
 
 def make_size(plan: Plan, method: Kalman | Rls) -> Size:
-    window = 0 if isinstance(method, Kalman) else int(method.m)
+    bodies, estimated = len(plan.initial_velocity), len(plan.initial)
+    offsets = bodies if isinstance(method, Kalman) and method.offsets else 0
     return Size(
-        len(plan.has_offset),
-        len(plan.initial_velocity),
-        len(plan.ends),
-        len(plan.element),
-        len(plan.initial),
-        len(plan.initial_velocity) if isinstance(method, Kalman) and method.offsets else 0,
-        len(plan.share),
-        window,
+        channels=len(plan.has_offset),
+        accelerometers=len(plan.body_channels),
+        bodies=bodies,
+        elements=len(plan.ends),
+        parameters=len(plan.element),
+        estimated=estimated,
+        offsets=offsets,
+        unknowns=estimated + offsets,
+        equations=len(plan.share),
+        window=0 if isinstance(method, Kalman) else int(method.m),
     )
 
 

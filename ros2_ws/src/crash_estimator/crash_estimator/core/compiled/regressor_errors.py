@@ -74,11 +74,12 @@ def late(theta, of_filter, covariance, stated):
             stated[j, k] = covariance[j, k] + more[j] * more[k]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def pass_one(whole, shared, gain, psi, h, n, c):
     """`pass_on` for one equation: gain (w,), psi (w,), h (3, b); c (w,) is scratch.
 
-    S + g c' + c g' + v g g' = S + g d' + d g' with d = c + v g / 2. A body without errors has none to share.
+    S + g c' + c g' + v g g' = S + g d' + d g' with d = c + v g / 2. A body without errors has none to share; most of
+    psi is 0, and the gain of what is held: nothing is added for those.
     """
     w, v = len(gain), 0.0
     c[:] = 0.0
@@ -91,11 +92,13 @@ def pass_one(whole, shared, gain, psi, h, n, c):
         for j in range(w):
             c[j] += h0 * shared[0, b, j] + h1 * shared[1, b, j] + h2 * shared[2, b, j]
     for j in range(w):
-        v -= 2.0 * psi[j] * c[j]
+        if psi[j] != 0.0:
+            v -= 2.0 * psi[j] * c[j]
     for k in range(w):
         if psi[k] != 0.0:
             for j in range(w):
-                v += psi[k] * psi[j] * whole[k, j]
+                if psi[j] != 0.0:
+                    v += psi[k] * psi[j] * whole[k, j]
     for k in range(w):
         if psi[k] != 0.0:
             for j in range(w):
@@ -103,8 +106,13 @@ def pass_one(whole, shared, gain, psi, h, n, c):
     for j in range(w):
         c[j] += 0.5 * v * gain[j]
     for j in range(w):
-        for k in range(w):
-            whole[j, k] += gain[j] * c[k] + c[j] * gain[k]
+        if gain[j] != 0.0:
+            for k in range(w):
+                whole[j, k] += gain[j] * c[k] + c[j] * gain[k]
+        else:
+            for k in range(w):
+                if gain[k] != 0.0:
+                    whole[j, k] += c[j] * gain[k]
     for b in range(h.shape[1]):
         if n[b, 0] == 0.0 and n[b, 3] == 0.0 and n[b, 6] == 0.0:
             continue
@@ -113,13 +121,15 @@ def pass_one(whole, shared, gain, psi, h, n, c):
         u = h0 * (n[b, 1] + n[b, 6]) + h1 * n[b, 3] + h2 * n[b, 4]
         d = h0 * n[b, 2] + h1 * n[b, 4] + h2 * n[b, 5]
         for j in range(w):
-            z -= psi[j] * shared[0, b, j]
-            u -= psi[j] * shared[1, b, j]
-            d -= psi[j] * shared[2, b, j]
+            if psi[j] != 0.0:
+                z -= psi[j] * shared[0, b, j]
+                u -= psi[j] * shared[1, b, j]
+                d -= psi[j] * shared[2, b, j]
         for j in range(w):
-            shared[0, b, j] += gain[j] * z
-            shared[1, b, j] += gain[j] * u
-            shared[2, b, j] += gain[j] * d
+            if gain[j] != 0.0:
+                shared[0, b, j] += gain[j] * z
+                shared[1, b, j] += gain[j] * u
+                shared[2, b, j] += gain[j] * d
 
 
 @njit(cache=True)

@@ -4,14 +4,14 @@ import numpy as np
 from numba import njit
 
 from .factors import product_of
-from .kalman import Filter, filtered
+from .kalman import Filter, Limits, filtered
 from .linear import invert, multiply
 from .regressor_errors import late, pass_on
 
 
 @njit(cache=True)
 def correct(
-    plan, method, s, gradient, by_errors, errors, target, active, learnt, dt, multiplier, error, clamped, gain
+    limits, method, s, gradient, by_errors, errors, target, active, learnt, dt, multiplier, error, clamped, gain
 ):  # fmt: skip
     """One step of the recursion in place; fills error (q,) (NaN where not measured), clamped (p,) and gain (p, q).
 
@@ -79,14 +79,14 @@ def correct(
             for k in range(p):
                 step += inverse[j, k] * pull[k]
             step *= multiplier
-            limit = method.step_limit * plan.scale[j]
+            limit = method.step_limit * limits.scale[j]
             if multiplier != 1.0 and abs(step) > limit:
                 gain[j] *= limit / abs(step)
                 step = min(max(step, -limit), limit)
             s.theta[j] = start[j] + step
         for j in range(p):
-            if free[j] and (s.theta[j] < plan.lower[j] or s.theta[j] > plan.upper[j]):
-                start[j] = min(max(s.theta[j], plan.lower[j]), plan.upper[j])
+            if free[j] and (s.theta[j] < limits.lower[j] or s.theta[j] > limits.upper[j]):
+                start[j] = min(max(s.theta[j], limits.lower[j]), limits.upper[j])
                 free[j] = 0.0
                 clamped[j] = 1.0
                 again = True
@@ -163,7 +163,7 @@ def excess_of(method, s, errors):
 
 
 @njit(cache=True)
-def rewind(plan, method, s, by_errors, errors, clamped):
+def rewind(limits, method, s, by_errors, errors, clamped):
     """Use the window again with the larger correction while that lessens the mean error -> passes made."""
     m, q = s.window_error.shape
     repeated, error, held = np.empty((m, q)), np.empty(q), clamped.copy()
@@ -176,7 +176,7 @@ def rewind(plan, method, s, by_errors, errors, clamped):
         chosen_variance(s, chosen)
         for t in range(m):
             correct(
-                plan, method, s, s.window_gradient[t], by_errors, errors, s.window_target[t], s.window_active[t],
+                limits, method, s, s.window_gradient[t], by_errors, errors, s.window_target[t], s.window_active[t],
                 s.window_noise[t], s.window_dt[t], method.cr, error, held, gain,
             )  # fmt: skip
             s.window_influence[t] += gain
@@ -223,9 +223,12 @@ def remember(s, gradient, target, learnt, active, dt, error, gain, m):
 
 
 @njit(cache=True, inline="always")
-def rls_step(plan, method, s, row, dt, known, gradient, by_errors, errors, active, walk, learnt, target, clamped):
+def rls_step(plan, method, s, row, dt, w):
     """Correction, rewinds (MRLS), and the slow residual variance that sets the error limits."""
+    known, gradient, by_errors, errors, active = w.known, w.gradient, w.by_errors, w.errors, w.active
+    learnt, target, clamped = w.learnt, w.target, w.clamped
     p, q, m = len(s.theta), len(known), len(s.window_dt)
+    limits = Limits(plan.lower, plan.upper, plan.scale)
     unstarted = False
     for i in range(q):
         target[i] = row.measured[i] - known[i]
@@ -245,13 +248,13 @@ def rls_step(plan, method, s, row, dt, known, gradient, by_errors, errors, activ
             row.innovation_covariance[i, k] = total
     error, gain = np.empty(q), np.empty((p, q))
     correct(
-        plan, method, s, gradient, by_errors, errors, target, active, learnt, dt, 1.0, error, clamped, gain
+        limits, method, s, gradient, by_errors, errors, target, active, learnt, dt, 1.0, error, clamped, gain
     )  # fmt: skip
     if not m:
         add_influence(s.carried, gain, s.noise)
     else:
         remember(s, gradient, target, learnt, active, dt, error, gain, m)
-        row.rewinds[0] = rewind(plan, method, s, by_errors, errors, clamped) if int(s.clock[1]) == m else 0
+        row.rewinds[0] = rewind(limits, method, s, by_errors, errors, clamped) if int(s.clock[1]) == m else 0
         gain[:, :] = s.window_influence[int(s.clock[1]) - 1]
     covariance_of(s)
     for i in range(q):
@@ -272,10 +275,8 @@ def rls_step(plan, method, s, row, dt, known, gradient, by_errors, errors, activ
             s.noise[i] = max(s.noise[i], learnt[i])
     s.stated[:, :] = s.covariance + s.beside
     if plan.drift_squared.max() > 0.0:
-        filtered(
-            plan, method, Filter(s.walking, s.factors, s.walking_noise, s.walking_beside, s.walking_shared), dt,
-            gradient, by_errors, errors, active, walk, learnt, target, np.empty(p), np.empty((q, q)), np.empty(q),
-        )  # fmt: skip
+        walking = Filter(s.walking, s.factors, s.walking_noise, s.walking_beside, s.walking_shared)
+        filtered(limits, method, walking, dt, w, w.held, w.expected, w.left)
         product_of(s.factors, s.stated)
         s.stated[:, :] += s.walking_beside
         late(s.theta, s.walking, s.stated, s.stated)

@@ -26,7 +26,7 @@ import numpy as np
 
 from crash_replay.recording import Sample, Test
 
-from ..estimate import Description, Estimate, ParameterStatus
+from ..estimate import Description, Estimate, ParameterStatus, nothing_said
 from ..kinematics import Kinematics, KinematicState, Motion
 from ..regression import Regression
 from ..structure import ModelError, Structure
@@ -46,7 +46,7 @@ class MassState(NamedTuple):
     theta: np.ndarray  # (p,) kg
     information: np.ndarray  # (p, p) S, (m/s^2)^2
     squares: float  # sum of e^2 with forgetting, N^2
-    count: float  # intervals with forgetting
+    counted: float  # intervals with forgetting
     error_variance: float  # Lambda, N^2; 1 where every interval counts alike
     gamma: float
 
@@ -100,6 +100,7 @@ class EffectiveMass:
             bodies=tuple(body.name for body in structure.bodies),
             masses=tuple(body.mass or float("nan") for body in structure.bodies),
         )
+        self.nothing = nothing_said(self.description)
 
     def _check(self) -> None:
         name = self.structure.name
@@ -137,7 +138,7 @@ class EffectiveMass:
     def _updated(self, state: MassState, mean: Regression) -> MassState:
         """One step of the recursion."""
         forgetting, psi = self.settings.forgetting, mean.gradient
-        before = state.information if state.count else LEAST**2 / state.error_variance * np.eye(len(self.start))
+        before = state.information if state.counted else LEAST**2 / state.error_variance * np.eye(len(self.start))
         innovation = mean.measured - psi @ state.theta
         gamma, scatter = 1.0 / (forgetting / state.gamma + 1.0), state.error_variance
         if self.settings.weighted:
@@ -146,15 +147,15 @@ class EffectiveMass:
         theta = state.theta + np.linalg.solve(information, psi.T @ innovation) / scatter
         squares = forgetting * state.squares + float(innovation @ (mean.measured - psi @ theta))
         return state._replace(
-            theta=theta, information=information, squares=squares, count=forgetting * state.count + 1.0,
+            theta=theta, information=information, squares=squares, counted=forgetting * state.counted + 1.0,
             error_variance=scatter, gamma=gamma,
         )  # fmt: skip
 
     def _balance(self, state: MassState) -> Balance:
         p = len(self.start)
-        if state.count <= p:
+        if state.counted <= p:
             return Balance(np.diag(self.start**2), 0.0)
-        variance = state.squares / (state.count - p)
+        variance = state.squares / (state.counted - p)
         covariance = (1.0 if self.settings.weighted else variance) * np.linalg.inv(state.information)
         return Balance(0.5 * (covariance + covariance.T), variance)
 
@@ -174,29 +175,21 @@ class EffectiveMass:
         psi, balance = regression.gradient, self._balance(after)
         predicted = regression.known + psi @ after.theta
         innovation_covariance = balance.variance + psi @ balance.covariance @ psi.T
-        nothing, none = np.zeros(0), np.zeros(0, dtype=np.uint8)
-        n = len(self.free)
-        return Estimate(
+        return self.nothing._replace(
             number=sample.number,
             time_ns=sample.time_ns,
             parameters=self.back @ after.theta + self.constant,
             covariance=self.back @ balance.covariance @ self.back.T,
-            status=np.full(n, ParameterStatus.ESTIMATED, dtype=np.uint8),
+            status=np.full(len(self.free), ParameterStatus.ESTIMATED, dtype=np.uint8),
             measured=regression.measured,
             predicted=predicted,
             innovation=regression.measured - regression.known - psi @ before,
             innovation_covariance=innovation_covariance,
             residual=regression.measured - predicted,
             residual_std=np.full(1, np.sqrt(balance.variance)),
-            crush=nothing,
-            rate=nothing,
-            force=nothing,
-            force_std=nothing,
-            state=none,
             displacement=motion.displacement,
             velocity=motion.velocity,
             acceleration=motion.acceleration,
-            events=(),
         )
 
 

@@ -90,7 +90,9 @@ def driven_by(experiment: Experiment, theta: np.ndarray) -> list[tuple[int, int,
 
 def _driving(layout: Layout) -> dict[int, Sequence[str]]:
     """The driven bodies, and the channels that each is driven by."""
-    found = {k: body.acceleration for k, body in enumerate(layout.structure.bodies) if body.driven}
+    found: dict[int, Sequence[str]] = {
+        k: body.acceleration for k, body in enumerate(layout.structure.bodies) if body.driven
+    }
     return found | {k: (channel,) for channel, k in layout.attached.items()}
 
 

@@ -109,8 +109,8 @@ def linearise(
     defect[:, free] -= trajectory.a[:, free]
     if observer:
         defect[:, free] -= observer.acceleration(trajectory)[:, free]
-    for k in np.flatnonzero(~driven):
-        actions.acting.append((0, int(k), defect[:, k]))
+    for own in np.flatnonzero(~driven).tolist():
+        actions.acting.append((0, own, defect[:, own]))
     linear, knots = _linear_system(experiment, forces, actions, observer.rate if observer else 0.0)
     every = np.concatenate([np.array(list(actions.columns), dtype=int), knots])
     return Equations(linear, sampled, rows, every, forces)

@@ -60,7 +60,7 @@ def try_some(
         screened, fewest, leaders = _screened(state, magnitudes, effects, before), 1, leaders[:1]
     waiting = [one for one in shortlist(screened, SHORTLIST) if one.addition.key not in {a.key for a in leaders}]
     turn = sorted(waiting, key=lambda one: state.turns.get(one.addition.key, -1))[:1]
-    chosen = [(addition, None) for addition in leaders]
+    chosen: list[tuple[Addition, Screened | None]] = [(addition, None) for addition in leaders]
     place = 2 if state.updates % 4 == 3 else 1  # at the end is who is left out when time runs out
     chosen[place:place] = [(_variant(magnitudes, one.addition, state.updates), one) for one in turn]
     found: list[CandidateFit] = []
@@ -72,9 +72,9 @@ def try_some(
     turns = {**state.turns, **{tried.addition.key: state.updates for tried in found}}
     again = {tried.addition.key for tried in now}
     ahead = [as_found(tried) for tried in now] + [addition for addition in state.leaders if addition.key not in again]
-    leaders = tuple(sorted(ahead, key=lambda addition: -gains[addition.key])[:LEADERS])
+    best = tuple(sorted(ahead, key=lambda addition: -gains[addition.key])[:LEADERS])
     fits = {tried.addition.key: tried.fit for tried in now}
-    after = OnlineState(state.updates + 1, leaders, gains, turns, screened, before.fit, fits)
+    after = OnlineState(state.updates + 1, best, gains, turns, screened, before.fit, fits)
     return after, now + _rest(screened, now, gains)
 
 
@@ -104,7 +104,7 @@ def _rest(screened: Sequence[Screened], now: Sequence[CandidateFit], gains: Mapp
     """Those not fitted now: as they were when last fitted, the others below them; a screened gain is an estimate."""
     most = now[0].gain if now else np.inf
     least = max(min(gains.values(), default=np.inf), 0.0)
-    rest = {tried.addition.key: None for tried in now}
+    rest: dict[Key, CandidateFit | None] = {tried.addition.key: None for tried in now}
     for one in screened:
         key = one.addition.key
         if key not in rest:

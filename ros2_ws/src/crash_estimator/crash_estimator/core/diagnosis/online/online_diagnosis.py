@@ -53,6 +53,7 @@ class OnlineDiagnosis:
     others: Sequence[Recording] = ()  # of the same structure, at other speeds
     effects: Mapping[str, Effect] = field(default_factory=lambda: EFFECTS)
     budget: float = BUDGET  # s of the processor's time in an update after which it begins no further candidate
+    other_records: Sequence[ObservedRecord] = field(init=False)
 
     def __post_init__(self):
         Kinematics(self.structure, self.test)

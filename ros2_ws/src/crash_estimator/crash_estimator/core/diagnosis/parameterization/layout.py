@@ -88,10 +88,10 @@ def make_layout(
                 bodies.append(addition.target)
                 kind.append(DRIVEN)
             if addition.touches:
-                knots, crush = magnitudes.touching(addition)
+                at, crush = magnitudes.touching(addition)
                 force = magnitudes.host_force(addition)
                 name = _touch_name(addition)
-                curve = b.curve(name, knots, crush, force, roughness.get(name, ROUGHNESS), 0.0)
+                curve = b.curve(name, at, crush, force, roughness.get(name, ROUGHNESS), 0.0)
                 touching.append((addition, curve))
     knots = len(b.start)
     links, terms = [], []

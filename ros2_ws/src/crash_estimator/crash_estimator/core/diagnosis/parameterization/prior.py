@@ -30,9 +30,9 @@ class Builder:
         self.blocks: list[tuple[np.ndarray, np.ndarray]] = []
 
     def add(self, name: str, start: float, std: float, mean=0.0, low=-np.inf, high=np.inf) -> int:
+        self.names.append(name)
         for column, item in zip(
-            (self.names, self.start, self.std, self.mean, self.low, self.high),
-            (name, start, max(std, LEAST_STD), mean, low, high),
+            (self.start, self.std, self.mean, self.low, self.high), (start, max(std, LEAST_STD), mean, low, high)
         ):
             column.append(item)
         return len(self.start) - 1
