@@ -55,7 +55,7 @@ benchmark-second: # the same on 300 tests of a second simulator: docs/second-gen
 benchmark-outside: # what is said of recordings made elsewhere, in DATA=FOLDER, which do not come with the project: docs/outside.md
 	@tools/env python -m crash_estimator.benchmarks.outside --data "$(DATA)"
 
-benchmark-coverage: # whether the stated sigmas hold, 40 seeds of five models (12 with what is not compiled), half an hour: docs/coverage.md; ARGS="--seeds 8 --to out/coverage.md"
+benchmark-coverage: # whether the stated sigmas hold, 40 seeds of five models, an hour: docs/coverage.md; ARGS="--seeds 8 --to out/coverage.md"
 	@tools/env python -m crash_estimator.benchmarks.coverage_page $(ARGS)
 
 chaos: # processes killed, stopped and started again on purpose, 200 runs: docs/chaos.md; ARGS="--runs 20", --seed, --only, --case
