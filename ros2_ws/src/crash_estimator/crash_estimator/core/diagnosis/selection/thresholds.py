@@ -29,7 +29,8 @@ class Thresholds(NamedTuple):
     again takes as long as the first look. Two of one effect that leave less, as neither alone does, are taken as found:
     what they leave is then less than the noise."""
     real_structure: float = 100.0
-    """Mean square from which on no second effect is looked for at once: of a real structure none takes that."""
+    """Mean square from which on no second effect is looked for at once, and none beyond those that are believed
+    together: of a real structure none takes that."""
     out_of_reach: float = 1000.0
     """Mean square, thirty times the noise, from which on no care in fitting makes noise of what is left. At 100 a
     simulated case that the usual fits lead astray was given up; on docs/outside.md both say the same."""
@@ -61,13 +62,13 @@ class Thresholds(NamedTuple):
     """Candidates from each of the two screenings that are fitted in full: with four the forms of dry friction left no
     place for the engine of NHTSA 10146 ..."""
     long_list: int = 10
-    """... and where none of them leaves white noise."""
+    """... and where none of them leaves white noise. Effects that are tried on two elements: with three, those of
+    side_mdb_door_car's unlike springs left no place for the right one."""
     most_hosts: int = 3
     """Bodies that an unmodelled one is tried on, with a curve to each neighbour; and further elements that an effect is
     tried on beside the one where it explains most."""
     with_care: int = 3
-    """Candidates that are then fitted on by other schedules, and that are tried with a second one at once; and effects
-    that are tried on two elements."""
+    """Candidates that are then fitted on by other schedules, and that are tried with a second one at once."""
     most_profiles: int = 4
     """Slopes on which an element may unload that are looked at over their value."""
     offset_starts: int = 2
