@@ -22,19 +22,23 @@ KINDS = [effect for effect in EVERY_EFFECT if effect.type in (
 )]  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def recording() -> Recording:
-    """Until the striker is on its way back."""
-    before, after = np.arange(-40, 0), np.arange(0, 260)
-    values = np.concatenate([np.zeros((len(before), 3)), motion(after / RATE)[:, :3]])
-    values += np.random.default_rng(1).normal(size=values.shape) * np.array([2.0, 2.0, 50.0])
+def short_record(rate: float, before: int, after: int, seed: int, speed: float) -> Recording:
+    """Of the striker and the plate, with white noise: so many samples before the impact and from it on."""
+    values = np.concatenate([np.zeros((before, 3)), motion(np.arange(after) / rate)[:, :3]])
+    values += np.random.default_rng(seed).normal(size=values.shape) * np.array([2.0, 2.0, 50.0])
     channels = (
         Channel("striker_ax", "acceleration", "striker", "x"),
         Channel("plate_ax", "acceleration", "plate", "x"),
         Channel("wall_fx", "force", "wall", "x"),
     )
-    time_ns = (np.concatenate([before, after]) * 1e9 / RATE).astype(np.int64)
-    return Recording(Test("striker", channels, initial_velocity={"striker": SPEED}), time_ns, values)
+    time_ns = (np.arange(-before, after) * 1e9 / rate).astype(np.int64)
+    return Recording(Test("striker", channels, initial_velocity={"striker": speed}), time_ns, values)
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    """Until the striker is on its way back."""
+    return short_record(RATE, 40, 260, seed=1, speed=SPEED)
 
 
 @pytest.mark.parametrize("effect", KINDS, ids=shown)

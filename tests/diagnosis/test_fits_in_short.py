@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from test_diagnosis_oracles import motion, problem_of, structure
+from test_diagnosis_oracles import problem_of, structure
+from test_diagnosis_oracles_in_short import short_record
 
 from crash_estimator.core.diagnosis.mechanics.linearization import _steps
 from crash_estimator.core.diagnosis.observation.record import observe
@@ -16,7 +17,7 @@ from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_m
 from crash_estimator.core.diagnosis.residuals.residuals import analyse
 from crash_estimator.core.effects.kinds.element_force import ElementForce
 from crash_estimator.core.structure import Coefficient, EffectSpec
-from crash_replay.recording import Channel, Recording, Test
+from crash_replay.recording import Recording
 
 RATE = 2500.0
 """Hz: each sample is a bin."""
@@ -24,17 +25,8 @@ RATE = 2500.0
 
 @pytest.fixture(scope="module")
 def recording() -> Recording:
-    """Of the striker and the plate, with white noise, from 100 ms before the impact."""
-    before, after = np.arange(-400, 0), np.arange(0, 200)
-    values = np.concatenate([np.zeros((len(before), 3)), motion(after / RATE)[:, :3]])
-    values += np.random.default_rng(2).normal(size=values.shape) * np.array([2.0, 2.0, 50.0])
-    channels = (
-        Channel("striker_ax", "acceleration", "striker", "x"),
-        Channel("plate_ax", "acceleration", "plate", "x"),
-        Channel("wall_fx", "force", "wall", "x"),
-    )
-    time_ns = (np.concatenate([before, after]) * 1e9 / RATE).astype(np.int64)
-    return Recording(Test("striker", channels, initial_velocity={"striker": 6.0}), time_ns, values)
+    """From 160 ms before the impact."""
+    return short_record(RATE, 400, 200, seed=2, speed=6.0)
 
 
 @pytest.mark.parametrize("below", [np.inf, 500.0])
