@@ -1,5 +1,6 @@
 """The viewer node in a process of its own: what estimators publish is in its file, however it is ended."""
 
+import re
 import signal
 import subprocess
 import time
@@ -57,6 +58,13 @@ class Stage(Node):
         self.test = self.create_publisher(msg.TestInfo, "test", LATCHED)
         self.state = self.create_publisher(msg.ReplayState, "replay_state", LATCHED)
         self.samples = self.create_publisher(msg.Samples, "samples", STREAM)
+        self.words: list[msg.Attendance] = []
+        self.create_subscription(msg.Attendance, "attendance", self.words.append, LATCHED)
+
+    def viewer_has_all(self) -> bool:
+        """Whether the viewer says that it has got and drawn everything, however slow the machine is."""
+        rclpy.spin_once(self, timeout_sec=0)
+        return any(word.done for word in self.words)
 
     def play(self, crash: crash_data.Crash, streams: dict[str, list[Block]]) -> None:
         """Wait for the viewer as a replay does, then send everything as fast as it goes."""
@@ -143,7 +151,7 @@ def test_a_signal_ends_it_with_everything_in_the_file(stage, crash, streams, tmp
     rrd = tmp_path / "signal.rrd"
     viewer = start(rrd, estimators="[mrls, ckf]")
     stage.play(crash, streams)
-    time.sleep(1.5)  # what was sent has arrived; some of it is not in the file yet
+    wait_until(stage.viewer_has_all, "the viewer says that it has all")
     viewer.send_signal(number)
     output, errors = end(viewer, timeout=POLITE)
     assert output == f"wrote {rrd}: {whole(*NAMES)}\n"
@@ -206,8 +214,8 @@ def test_a_signal_before_the_end_is_said_to_be_the_reason(stage, crash, streams,
     time.sleep(1.5)
     viewer.send_signal(signal.SIGTERM)
     _, errors = end(viewer, timeout=POLITE, status=1)
-    assert errors.splitlines()[-1].startswith("incomplete: mrls 30 of 240 samples")
-    assert errors.splitlines()[-1].endswith("ended before the rest came")
+    said = re.match(r"incomplete: mrls (\d+) of 240 samples .*ended before the rest came$", errors.splitlines()[-1])
+    assert said and int(said[1]) <= 30, errors  # how many of the 30 it has taken by then is the machine's affair
 
 
 def test_a_file_that_cannot_be_written_is_one_line(stage, tmp_path):
