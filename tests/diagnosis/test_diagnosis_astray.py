@@ -12,7 +12,7 @@ from crash_estimator.core.diagnosis.report.diagnosis import diagnose
 from crash_estimator.core.diagnosis.residuals.residuals import free_run
 from crash_estimator.core.diagnosis.selection.acceptance import better
 from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
-from crash_estimator.core.diagnosis.selection.forward_selection import forward_selection
+from crash_estimator.core.diagnosis.selection.forward_selection import first_step, forward_selection
 from crash_estimator.core.diagnosis.selection.pruning import up_to_the_least_error
 from crash_estimator.core.diagnosis.selection.selection_step import in_recorded_noise, weighed
 from crash_estimator.core.effects import EFFECTS
@@ -41,7 +41,7 @@ def fitted(*case):
 def searched():
     """Steps and the last model of a case that the vocabulary cannot explain."""
     magnitudes, given = fitted(*ROTATING_IMPACTOR)
-    return forward_selection(magnitudes, EFFECTS, given)
+    return forward_selection(magnitudes, EFFECTS, given, first_step(magnitudes, EFFECTS, given))
 
 
 def test_what_a_model_leaves_as_given_is_what_its_own_simulation_leaves():

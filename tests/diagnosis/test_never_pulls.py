@@ -11,7 +11,7 @@ from crash_estimator.cli.work.diagnose import apply
 from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 from crash_estimator.core.diagnosis.report.diagnosis import diagnose
-from crash_estimator.core.diagnosis.selection.assumptions import never_pulling
+from crash_estimator.core.diagnosis.selection.contacts import never_pulling
 from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.fold import run

@@ -1,11 +1,16 @@
 """Effects that are looked for second: where they are named, and where they are not even tried."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from crash_estimator.core.diagnosis import diagnose
-from crash_estimator.core.diagnosis.selection.rare_effects import common_effects
+from crash_estimator.core.diagnosis.selection import rare_effects, selection_step
+from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
+from crash_estimator.core.diagnosis.selection.rare_effects import common_effects, with_rare_ones
+from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.structure import EffectSpec
 from crash_estimator.model_file import ModelFile
@@ -47,6 +52,43 @@ def test_none_is_tried_where_nothing_is_missing():
     model, recordings, _ = case("impactor")
     found = diagnose(model, recordings)
     assert found.verdict == "adequate" and not RARE & {ranked.effect for ranked in found.ranking}
+
+
+def fitted(name: str, cost: float) -> CandidateFit:
+    addition = SimpleNamespace(key=(name, "spring"))
+    return CandidateFit(addition, 1e5 - cost, SimpleNamespace(cost=cost))
+
+
+@pytest.mark.parametrize(
+    ("left_by_common", "left_by_rare", "asked", "leads"),
+    [
+        (1e4, 1e3, [False], "gas_cushion"),  # noise, as a common one does not leave
+        (1e3, 900.0, [False], "gas_cushion"),  # both leave noise: they stand in one ranking
+        (1e3, 1e3 + 50.0, [False], "friction"),
+        (1e4, 9e3, [False, True], "friction"),  # less than the common one, but no noise: tried with care
+        (1e4, 2e4, [False], "friction"),
+    ],
+)
+def test_a_rare_effect_comes_into_the_ranking_where_it_leaves_noise(
+    monkeypatch, left_by_common, left_by_rare, asked, leads
+):
+    tried = []
+
+    def fit_candidates(magnitudes, effects, model, thorough=False, least=np.inf):
+        assert set(effects) == RARE | {"rate_hardening"} and least == left_by_common
+        tried.append(thorough)
+        return [fitted("gas_cushion", cost=left_by_rare)]
+
+    monkeypatch.setattr(rare_effects, "fit_candidates", fit_candidates)
+    monkeypatch.setattr(selection_step, "analyse", lambda fit: SimpleNamespace(white=fit.cost < 2e3))
+    model = SimpleNamespace(white=False, fit=SimpleNamespace(cost=1e5), records=[SimpleNamespace(below=np.inf)])
+    step = SelectionStep(model, [fitted("friction", cost=left_by_common)])
+    magnitudes = SimpleNamespace(structure=SimpleNamespace(effects=()))
+    found = with_rare_ones(magnitudes, EFFECTS, step)
+    assert tried == asked and found.best.addition.key[0] == leads
+    assert (found is step) == (left_by_rare >= 2e3)  # what leaves more than noise is not even told
+    model.records[0].below = 240.0  # in a band alone anything leaves noise
+    assert with_rare_ones(magnitudes, EFFECTS, step) is step
 
 
 def test_what_the_model_has_is_common_in_all_its_forms():

@@ -11,6 +11,8 @@ from crash_estimator.core.diagnosis.online.candidate_turns import OnlineState
 from crash_estimator.core.diagnosis.selection import assumptions, candidate_fits, forward_selection, selection_step
 from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
 
+MAGNITUDES = SimpleNamespace(structure=None)
+
 
 def model(white=False, cost=1000.0, mean_square=50.0, evidence=0.0, additions=()):
     fit = SimpleNamespace(cost=cost, evidence=evidence, layout=None)
@@ -66,39 +68,64 @@ def test_an_effect_on_two_elements_is_looked_for_only_where_one_leaves_more_than
 ):
     asked, given = [], model(white=True)
     first = SimpleNamespace(leaves_noise=leaves_noise, candidates=[])
-    monkeypatch.setattr(forward_selection, "as_expected", lambda *given: None)
-    monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda *given: first)
+    monkeypatch.setattr(forward_selection, "common_effects", lambda *given: {})
     monkeypatch.setattr(forward_selection, "out_of_time", lambda: out_of_time)
     monkeypatch.setattr(forward_selection, "two_of_one_effect", lambda *given: asked.append(given) or [])
     monkeypatch.setattr(forward_selection, "near_the_floor", lambda *given: None)
     monkeypatch.setattr(forward_selection, "_one_by_one", lambda *given: ([first], model(white=True)))
-    forward_selection.forward_selection(None, {}, given)
+    forward_selection.forward_selection(MAGNITUDES, {}, given, first)
     assert bool(asked) == looked_for
 
 
 def test_a_search_out_of_time_has_looked_at_all_candidates_once(monkeypatch):
     step = SimpleNamespace(best=None, before=None, candidates=[])
     monkeypatch.setattr(forward_selection, "out_of_time", lambda: True)
+    monkeypatch.setattr(forward_selection, "common_effects", lambda *given: {})
     monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda *given: step)
+    monkeypatch.setattr(forward_selection, "with_rare_ones", lambda m, e, first: first)
     monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done: done)
     monkeypatch.setattr(forward_selection, "better", lambda one, other: False)
     monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final, present: (path, final))
-    path, _ = forward_selection._one_by_one(None, {}, model(), [], 0)
+    path, _ = forward_selection._one_by_one(MAGNITUDES, {}, model(), [], 0)
     assert path == [step]
 
 
 @pytest.mark.parametrize(("promised", "tried"), [({}, []), ({"b": 3.0}, ["b"]), ({"a": 2.0, "c": 3.0}, ["c", "a"])])
 def test_contacts_are_assumed_otherwise_as_long_as_that_promises_anything(monkeypatch, promised, tried):
+    searched = with_contacts(monkeypatch, promised)
+    assert assumptions._selected("stated", (), {}).final.white is False
+    assert searched == ["stated", *tried]
+
+
+@pytest.mark.parametrize(
+    ("noise_under", "searched_under"), [("b", ["stated", "b"]), ("none", ["stated", "b", "stated"])]
+)
+def test_where_other_contacts_promise_more_than_a_first_step_they_are_tried_before_a_second(
+    monkeypatch, noise_under, searched_under
+):
+    """As they were stated all is looked for only where the others leave more than noise."""
+    searched = with_contacts(monkeypatch, {"b": 3.0}, noise_under, ends_early=True)
+    found = assumptions._selected("stated", (), {})
+    assert searched == searched_under
+    assert found.whole and found.final.white == (noise_under == "b")
+
+
+def with_contacts(monkeypatch, promised, noise_under="none", ends_early=False) -> list[str]:
+    """Contacts a, b and c that promise something (nats) and leave noise or not -> where all is looked for, in turn."""
     searched = []
-    path = SimpleNamespace(structure="", records=(), added=())
+
+    def search(structure, records, effects, expected=(), elsewhere=lambda path: False):
+        searched.append(structure)
+        final = model(white=structure == noise_under)
+        path = assumptions.SelectionPath(structure, [], final, 0, final.fit, (), 36)
+        return path._replace(whole=not (ends_early and elsewhere(path)))
+
     for name, short in (("never_pulling", "a"), ("elastic_when_spent", "b"), ("all_when_spent", "c")):
         monkeypatch.setattr(assumptions, name, lambda structure, short=short: short)
     monkeypatch.setattr(assumptions, "_promised", lambda other, *given: promised.get(other, -np.inf))
     monkeypatch.setattr(assumptions, "out_of_time", lambda: False)
-    monkeypatch.setattr(assumptions, "SelectionPath", SimpleNamespace(rank=lambda one: 0))
-    monkeypatch.setattr(assumptions, "_as_exact_as_needed", lambda s, *given: searched.append(s) or path)
-    assert assumptions._selected("", (), {}) is path
-    assert searched == ["", *tried]
+    monkeypatch.setattr(assumptions, "_as_exact_as_needed", search)
+    return searched
 
 
 @pytest.mark.parametrize(("gain", "cost", "promises"), [
@@ -117,7 +144,7 @@ def test_other_contacts_must_explain_a_share_of_what_is_above_the_noise(monkeypa
     monkeypatch.setattr(assumptions, "measure_magnitudes", lambda *given: None)
     monkeypatch.setattr(assumptions, "in_the_sensors_noise", lambda model, records: model.fit)
     monkeypatch.setattr(assumptions, "_likely", lambda path: ())
-    monkeypatch.setattr(assumptions, "_moves_otherwise", lambda *given: True)
+    monkeypatch.setattr(assumptions, "moves_otherwise", lambda *given: True)
     monkeypatch.setattr(assumptions, "fit_model", lambda *given: otherwise)
     assert np.isfinite(assumptions._promised("other", path, [record])) == promises
 

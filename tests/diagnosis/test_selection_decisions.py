@@ -53,6 +53,7 @@ def test_what_leaves_noise_or_has_no_time_is_not_searched_in_a_smaller_band(monk
 def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypatch, wanted, out_of_time, searches):
     begun, given = [], model(1.5)
     made_up = {
+        "first_step": lambda *given: None,
         "forward_selection": lambda *given: begun.append(given) or ([step(given[2])], given[2]),
         "measure_magnitudes": lambda *given: SimpleNamespace(cells=72),
         "fit_model": lambda *given: model(1.5),
@@ -114,10 +115,21 @@ def test_what_is_still_far_from_noise_is_not_searched_for_more_than_is_believed(
     assert asked == fitted
 
 
-def one_by_one(monkeypatch, left: float, search) -> tuple[list, SimpleNamespace]:
+def test_beside_a_rare_effect_none_is_fitted(monkeypatch):
+    asked = []
+    one_by_one(
+        monkeypatch, 2.0, lambda before, fit: asked.append(fit) or step(before, 500.0 if fit else 0.0), rare=True
+    )
+    assert asked == [True, False]
+
+
+def one_by_one(monkeypatch, left: float, search, rare: bool = False) -> tuple[list, SimpleNamespace]:
     """Each addition takes a tenth of the mean square away; left: of it at first, search: before, fitted."""
     said = lambda m, e, before, path, fitted: search(before, fitted)  # noqa: E731
+    monkeypatch.setattr(forward_selection, "common_effects", lambda *given: {})
+    monkeypatch.setattr(forward_selection, "is_rare", lambda addition: rare)
     monkeypatch.setattr(forward_selection, "in_recorded_noise", said)
+    monkeypatch.setattr(forward_selection, "with_rare_ones", lambda m, e, first: first)
     monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done: done)
     monkeypatch.setattr(forward_selection, "_without", lambda model, found: model)
     monkeypatch.setattr(
@@ -127,7 +139,7 @@ def one_by_one(monkeypatch, left: float, search) -> tuple[list, SimpleNamespace]
     )
     monkeypatch.setattr(forward_selection, "analyse", lambda fit: SimpleNamespace(mean_square=1.0))
     monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final, present: (path, final))
-    return forward_selection._one_by_one(None, {}, model(left), [], 0)
+    return forward_selection._one_by_one(SimpleNamespace(structure=None), {}, model(left), [], 0)
 
 
 FALLS_TO_ZERO = dict(tension=False, parallel=(), remembering=(), damping=None, known_damping=0.0)

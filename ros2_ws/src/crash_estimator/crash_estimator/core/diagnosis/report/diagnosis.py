@@ -17,9 +17,9 @@ from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import free_run, noise_floor
 from ..residuals.score_test import drift_of
 from ..selection.acceptance import share_removed
-from ..selection.assumptions import SelectionPath, up_to
+from ..selection.assumptions import SelectionPath, first_believed, select, up_to
 from ..selection.fitted_model import Model
-from ..selection.rare_effects import common_effects, select_common_first
+from ..selection.rare_effects import common_effects
 from ..selection.selection_step import fit_of_all
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_limit import out_of_time, time_limit
@@ -106,7 +106,7 @@ def diagnose(
     structure, recordings = with_accelerations(structure, recordings)
     with time_limit(seconds):
         records, zero, unused = _observed(structure, recordings, common_effects(structure, effects))
-        path = select_common_first(structure, records, effects, lambda found: _is_good_enough(found, tolerance))
+        path = first_believed(select(structure, records, effects))
         stopped = out_of_time()
     found = _answer(structure, path, tolerance, zero)
     remarks = [clipped] if clipped else []
@@ -115,11 +115,6 @@ def diagnose(
     if stopped:
         remarks.append(f"stopped after {seconds:g} s: not everything was tried")
     return replace(found, stopped=stopped, text="; ".join([found.text, *remarks]))
-
-
-def _is_good_enough(path: SelectionPath, tolerance: Tolerance) -> bool:
-    """Nothing was found to add, and what the model leaves is noise or within the tolerance."""
-    return not path.added and (path.final.white or tolerance.admits(left_by(path.final, band_of(path.final))))
 
 
 def _observed(

@@ -4,8 +4,7 @@ A model file says neither how sharply a structure folds, nor, unless it is asked
 that carries compression only may pull, and what still acts where that spring is spent.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import NamedTuple
 
@@ -13,20 +12,18 @@ import numpy as np
 
 from ...effects.effect import Addition, Effect
 from ...structure import Structure
-from ...structure_parts import ALL, SPRINGS
-from ..mechanics.linearization import linearise
 from ..observation.record import ObservedRecord
 from ..output_error.gauss_newton import Fit, fit
 from ..output_error.problem import make_problem
-from ..parameterization.experiment import experiments_of
 from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
 from ..parameterization.model_terms import additions_of
 from ..residuals.residuals import Residuals, analyse
 from ..residuals.score_test import drift_of
 from ..residuals.vibration import vibrates_from
 from .acceptance import share_removed
+from .contacts import all_when_spent, elastic_when_spent, moves_otherwise, never_pulling
 from .fitted_model import Model, fit_model
-from .forward_selection import forward_selection
+from .forward_selection import first_step, forward_selection
 from .pruning import up_to_the_least_error
 from .selection_step import SelectionStep, as_found
 from .thresholds import THRESHOLDS
@@ -49,6 +46,7 @@ class SelectionPath(NamedTuple):
     as_recorded: Fit  # of the final model, in the sensors' noise
     records: Sequence[ObservedRecord]  # in the band that was compared
     cells: int  # of the final model's curves
+    whole: bool = True  # False: it ends before its first addition, as other assumptions promise more
 
     @property
     def noise(self) -> bool:
@@ -59,9 +57,9 @@ class SelectionPath(NamedTuple):
     def added(self) -> Sequence[Addition]:
         return self.final.additions[self.present :]
 
-    def rank(self) -> tuple[bool, float]:
+    def rank(self) -> tuple[bool, bool, float]:
         """Of paths under different assumptions the largest is believed."""
-        return self.final.white, self.as_recorded.evidence
+        return self.final.white, self.whole, self.as_recorded.evidence
 
 
 def select(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
@@ -78,18 +76,31 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
 
 
 def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
-    """Under the contacts that the structure states, then under those that promise most, until none does."""
-    path = _as_exact_as_needed(structure, records, effects)
+    """Under the contacts that the structure states, then under those that promise most, until none does.
+
+    Whether others promise more is asked after a first step that leaves more than noise already: one effect after the
+    other, to make up for contacts that are not so, takes ten times as long.
+    """
+
+    def promised(path: SelectionPath) -> dict[Callable[[Structure], Structure], float]:
+        """Nats, by what can be assumed otherwise; without what promises nothing."""
+        others = {assumed: assumed(path.structure) for assumed in untried}
+        nats = {one: _promised(other, path, path.records) for one, other in others.items() if other not in tried}
+        return {one: promise for one, promise in nats.items() if promise > -np.inf}
+
+    tried: list[Structure] = []  # under which all has been looked for
     untried = [never_pulling, elastic_when_spent, all_when_spent]
-    while untried and not out_of_time():
-        promised = {assumed: _promised(assumed(path.structure), path, path.records) for assumed in untried}
-        best = max(untried, key=promised.get)
-        if promised[best] == -np.inf:
-            break
+    path = _as_exact_as_needed(structure, records, effects, elsewhere=lambda begun: bool(promised(begun)))
+    tried += [structure] if path.whole else []
+    while untried and not out_of_time() and (others := promised(path)):
+        best = max(others, key=others.__getitem__)
         untried.remove(best)
         otherwise = _as_exact_as_needed(best(path.structure), path.records, effects, path.added)
+        tried.append(otherwise.structure)
         path = max(path, otherwise, key=SelectionPath.rank)
-    return path
+    if path.final.white or structure in tried or out_of_time():
+        return path
+    return max(path, _as_exact_as_needed(structure, records, effects), key=SelectionPath.rank)
 
 
 def first_believed(path: SelectionPath) -> SelectionPath:
@@ -111,26 +122,6 @@ def up_to(path: SelectionPath, count: int) -> SelectionPath:
     return path._replace(steps=path.steps[: count + 1], final=final, as_recorded=as_recorded)
 
 
-def never_pulling(structure: Structure) -> Structure:
-    """The structure whose dampers never pull where their element carries compression only."""
-    elements = tuple(e if e.tension else replace(e, damper_pulls=False) for e in structure.elements)
-    return replace(structure, elements=elements)
-
-
-def elastic_when_spent(structure: Structure) -> Structure:
-    """The structure where elastic forces beside a spring that is spent act on, as long as there is crush."""
-    return _acting_when_spent(structure, SPRINGS)
-
-
-def all_when_spent(structure: Structure) -> Structure:
-    """The structure where all forces beside a spring that is spent act on, as long as there is crush."""
-    return _acting_when_spent(structure, ALL)
-
-
-def _acting_when_spent(structure: Structure, what: str) -> Structure:
-    return replace(structure, elements=tuple(replace(e, acts_when_spent=what) for e in structure.elements))
-
-
 def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedRecord]) -> float:
     """Nats: the evidence of what was found, under contacts as they are assumed otherwise; -inf where nothing is
     missing, where they would explain none of it, or less than what leaves noise already.
@@ -147,7 +138,7 @@ def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedR
     found = ((model.additions, in_the_sensors_noise(model, records)) for model in models)
     most = -np.inf
     for additions, as_recorded in chain(found, _likely(path)):
-        if not _moves_otherwise(as_recorded, other):
+        if not moves_otherwise(as_recorded, other):
             continue
         otherwise = fit_model(magnitudes, records, additions).fit
         misfit = 0.5 * max(as_recorded.cost - samples, 0.0)  # nats
@@ -167,33 +158,22 @@ def _likely(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]]:
         yield (*first.before.additions, as_found(one)), one.fit
 
 
-def _moves_otherwise(fitted: Fit, other: Structure) -> bool:
-    """Whether the contacts of the other structure push any body otherwise along the fitted motion."""
-    problem = fitted.problem
-    contacts = {e.name: {"damper_pulls": e.damper_pulls, "acts_when_spent": e.acts_when_spent} for e in other.elements}
-    links = (replace(link, **contacts.get(link.name, {})) for link in problem.layout.links)
-    layout = problem.layout._replace(links=tuple(links))
-    pairs = zip(problem.experiments, experiments_of(layout, problem.records), fitted.trajectories, strict=True)
-    for one, changed, trajectory in pairs:
-        rows = [linearise(experiment, fitted.theta, trajectory).rows for experiment in (one, changed)]
-        if not np.array_equal(*rows):
-            return True
-    return False
-
-
 def _as_exact_as_needed(
     structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect],
-    expected: Sequence[Addition] = (),
+    expected: Sequence[Addition] = (), elsewhere: Callable[[SelectionPath], bool] = lambda path: False,
 ) -> SelectionPath:  # fmt: skip
     """Masses and zeros are as stated, unless nothing but noise is left with errors of them such as scales and sensors
-    have: by the model as given, or with fewer effects than were found. expected: found under other assumptions."""
+    have: by the model as given, or with fewer effects than were found.
+
+    expected: found under other assumptions; elsewhere: whether others promise more than a first step does.
+    """
     magnitudes, given = _as_given(structure, records, effects)
     if records[0].in_doubt:
-        return _with_curves_as_fine_as_needed(magnitudes, given, effects, expected)
+        return _with_curves_as_fine_as_needed(magnitudes, given, effects, expected, elsewhere)
     doubted = magnitudes._replace(records=[record.doubted() for record in records])
     start, path = _in_doubt(doubted, given), None
     if not _leaves_noise(start):
-        path = _with_curves_as_fine_as_needed(magnitudes, given, effects, expected)
+        path = _with_curves_as_fine_as_needed(magnitudes, given, effects, expected, elsewhere)
         models = [step.before for step in path.steps if step.before is not given]
         models += [] if path.steps[-1].before is path.final else [path.final]
         fewer = (_in_doubt(doubted, model) for model in models if not (model is path.final and path.noise))
@@ -230,17 +210,24 @@ def _leaves_noise(model: Model) -> bool:
 
 
 def _with_curves_as_fine_as_needed(
-    magnitudes: Magnitudes, given: Model, effects: Mapping[str, Effect], expected: Sequence[Addition]
-) -> SelectionPath:
+    magnitudes: Magnitudes, given: Model, effects: Mapping[str, Effect], expected: Sequence[Addition],
+    elsewhere: Callable[[SelectionPath], bool] = lambda path: False,
+) -> SelectionPath:  # fmt: skip
     structure, records, present = magnitudes.structure, magnitudes.records, given.additions
-    steps, final = forward_selection(magnitudes, effects, given, expected)
-    cells = magnitudes.cells
+    cells, first = magnitudes.cells, first_step(magnitudes, effects, given, expected)
+    if isinstance(first, SelectionStep) and not (first.leaves_noise or out_of_time()):
+        begun = SelectionPath(structure, [first], given, len(present), given.fit, records, cells, whole=False)
+        if elsewhere(begun):
+            return begun
+    steps, final = forward_selection(magnitudes, effects, given, first)
     as_recorded = in_the_sensors_noise(final, records)
     finer = measure_magnitudes(structure, records, FINER_CELLS)
     mimicked = final.white and not drift_of(as_recorded).constant
     if not out_of_time() and _wants_finer_curves(final, mimicked, analyse(as_recorded), finer, len(present)):
         found = final.additions[len(present) :]
-        finer_steps, finer_final = forward_selection(finer, effects, fit_model(finer, records, present), found)
+        finer_given = fit_model(finer, records, present)
+        finer_first = first_step(finer, effects, finer_given, found)
+        finer_steps, finer_final = forward_selection(finer, effects, finer_given, finer_first)
         fewer = len(finer_final.additions) < len(final.additions) or not final.white
         if finer_final.white and (fewer or (mimicked and drift_of(finer_final.fit).constant)):
             steps, final, cells = finer_steps, finer_final, finer.cells

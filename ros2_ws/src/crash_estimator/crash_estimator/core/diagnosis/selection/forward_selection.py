@@ -8,30 +8,42 @@ from ..residuals.residuals import analyse
 from .acceptance import better, explains_too_little, needed_gain
 from .candidate_fits import CandidateFit
 from .fitted_model import Model
-from .pair_search import as_expected, near_the_floor, two_at_once, two_of_one_effect
+from .pair_search import Pair, as_expected, near_the_floor, two_at_once, two_of_one_effect
 from .pruning import up_to_the_least_error, without_the_superseded
+from .rare_effects import common_effects, is_rare, with_rare_ones
 from .selection_step import SelectionStep, added, in_recorded_noise, weighed
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
 
 
-def forward_selection(
+def first_step(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], given: Model, expected: Sequence[Addition] = ()
+) -> SelectionStep | Pair:
+    """All candidates for a first addition to the model that is given; or two of them, where they leave next to nothing.
+
+    expected: found under other assumptions.
+    """
+    common = common_effects(magnitudes.structure, effects)
+    pair = as_expected(magnitudes, common, given, expected)
+    return pair or with_rare_ones(magnitudes, effects, in_recorded_noise(magnitudes, common, given))
+
+
+def forward_selection(
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], given: Model, first: SelectionStep | Pair
 ) -> tuple[list[SelectionStep], Model]:
-    """All steps, and the last model; given: what it starts from, expected: what was found under other assumptions."""
-    present = len(given.additions)
-    pair, alike, first = as_expected(magnitudes, effects, given, expected), [], None
-    if pair is None:
-        first = in_recorded_noise(magnitudes, effects, given)
-        if not (first.leaves_noise or out_of_time()):
-            alike = two_of_one_effect(magnitudes, given, first.candidates)
-            pair = near_the_floor(alike, first.candidates)
+    """All steps, and the last model; given: what it starts from, first: its `first_step`."""
+    present, common = len(given.additions), common_effects(magnitudes.structure, effects)
+    alike: list[Pair] = []
+    pair, step = (first, None) if isinstance(first, Pair) else (None, first)
+    if step and not (step.leaves_noise or out_of_time()):
+        alike = two_of_one_effect(magnitudes, given, step.candidates)
+        pair = near_the_floor(alike, step.candidates)
     if pair:
         return _one_by_one(pair.magnitudes, effects, pair.model, pair.path, present)
-    path, final = _one_by_one(magnitudes, effects, given, [], present, first)
+    path, final = _one_by_one(magnitudes, effects, given, [], present, step)
     if final.white or out_of_time():
         return path, final
-    pair = two_at_once(magnitudes, effects, given, path[0].as_recorded, alike)
+    pair = two_at_once(magnitudes, common, given, path[0].as_recorded, alike)
     if pair is None:
         return path, final
     other = _one_by_one(pair.magnitudes, effects, pair.model, pair.path, present)
@@ -47,10 +59,13 @@ def _one_by_one(
 ) -> tuple[list[SelectionStep], Model]:  # fmt: skip
     """The best candidate is added as long as there is one; path: the steps that have led to the model, first: the next
     one in the sensors' noise, where it is known."""
+    common = common_effects(magnitudes.structure, effects)
     while not (path and out_of_time()):
-        fitted = not _as_many_as_believed(model, present)
-        done = weighed(magnitudes, effects, first or in_recorded_noise(magnitudes, effects, model, path, fitted))
-        first = None
+        if first is None:
+            fitted = not _as_many_as_believed(model, present)
+            first = in_recorded_noise(magnitudes, common, model, path, fitted)
+            first = first if path else with_rare_ones(magnitudes, effects, first)
+        done, first = weighed(magnitudes, common, first), None
         path.append(done)
         fair = _without(model, done.best) if done.best and done.before is model else model
         if better(fair, model):
@@ -71,9 +86,11 @@ def _one_by_one(
 
 
 def _as_many_as_believed(model: Model, present: int) -> bool:
-    """Whether a further addition would neither be believed beside those found nor leave noise."""
+    """Whether a further addition would not be believed beside those found: a rare one is alone only, and more than two
+    only where they leave noise."""
+    found = model.additions[present:]
     far_from_noise = model.residuals.mean_square >= THRESHOLDS.real_structure
-    return far_from_noise and len(model.additions) - present >= THRESHOLDS.most_at_once
+    return any(map(is_rare, found)) or (far_from_noise and len(found) >= THRESHOLDS.most_at_once)
 
 
 def _without(model: Model, found: CandidateFit) -> Model:

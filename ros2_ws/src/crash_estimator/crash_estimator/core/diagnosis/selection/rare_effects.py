@@ -1,19 +1,15 @@
-"""Rare effects bend far: they are looked for after the common ones, and believed only where one of them alone leaves
-noise."""
+"""Rare effects bend far, and one of them with another beside it would follow most that no vocabulary has: they are
+asked after the common ones, in a first step only, and believed only where one of them alone leaves noise."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
-from ...effects.effect import Effect
+from ...effects.effect import Addition, Effect
 from ...structure import Structure
-from ..observation.record import ObservedRecord
-from ..parameterization.magnitudes import measure_magnitudes
-from .assumptions import SelectionPath, first_believed, select
-from .candidate_fits import fit_candidates
-from .fitted_model import fit_model
+from ..parameterization.magnitudes import Magnitudes
+from .candidate_fits import CandidateFit, fit_candidates
 from .selection_step import SelectionStep
-from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
 
 
@@ -24,46 +20,37 @@ def common_effects(structure: Structure, effects: Mapping[str, Effect]) -> Mappi
     return {name: effect for name, effect in found.items() if effect}
 
 
-def select_common_first(
-    structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect],
-    enough: Callable[[SelectionPath], bool],
-) -> SelectionPath:  # fmt: skip
-    """The effects that a structure lacks: the common ones, or those with rare ones among them that leave noise and are
-    as likely: then both stand in one ranking.
+def is_rare(addition: Addition) -> bool:
+    """Whether it is of an effect, or of a form of one, that is looked for last."""
+    common = addition.effect.common()
+    return common is None or addition.variant not in common.variants
 
-    enough: whether what the common ones leave is good enough, so that none is looked for beside them. Whether a rare
-    one leaves noise, alone, is asked first; only then is it set against all the others.
+
+def with_rare_ones(magnitudes: Magnitudes, effects: Mapping[str, Effect], step: SelectionStep) -> SelectionStep:
+    """A first step of common effects, with the rare ones in its ranking where one of them leaves noise, alone.
+
+    They are fitted with care where the common ones leave more than noise, and one of them less than the best of those.
     """
-    common = common_effects(structure, effects)
-    found = first_believed(select(structure, records, common))
-    if common == effects or enough(found):
-        return found
-    rare = {name: effect for name, effect in effects.items() if effect != common.get(name)}
-    if not _one_leaves_noise(rare, found):
-        return found
-    path = first_believed(select(structure, records, effects))
-    return found if out_of_time() or not _is_as_good(path, found) else path
+    common = common_effects(magnitudes.structure, effects)
+    rare = {name: effect for name, effect in effects.items() if effect is not common.get(name)}
+    model = step.before
+    in_a_band = any(np.isfinite(record.below) for record in model.records)
+    if not rare or model.white or in_a_band or out_of_time():
+        return step
+    least = min([model.fit.cost, *(one.fit.cost for one in step.candidates if one.fit)])
+    alone = SelectionStep(model, fit_candidates(magnitudes, rare, model, least=least))
+    leaves_less = any(one.fit and one.fit.cost < least for one in alone.candidates)
+    if leaves_less and not (step.leaves_noise or alone.leaves_noise):
+        alone = SelectionStep(model, fit_candidates(magnitudes, rare, model, thorough=True, least=least))
+    if not alone.leaves_noise:
+        return step
+    best: dict[tuple[str, str], CandidateFit] = {}
+    for one in sorted([*step.candidates, *alone.candidates], key=_rank):
+        best.setdefault(one.addition.key, one)
+    together = list(best.values())
+    return SelectionStep(model, together, together)
 
 
-def _one_leaves_noise(rare: Mapping[str, Effect], found: SelectionPath) -> bool:
-    """Whether one of them does, alone. It is fitted with care where it leaves less than what was found."""
-    magnitudes, other = measure_magnitudes(found.structure, found.records, found.cells), found.as_recorded.cost
-    model = fit_model(magnitudes, found.records, found.final.additions[: found.present])
-    if model.white or out_of_time():
-        return False
-    fits = fit_candidates(magnitudes, rare, model, least=other)
-    step = SelectionStep(model, fits)
-    if not step.leaves_noise and any(one.fit and one.fit.cost < other for one in fits):
-        step = SelectionStep(model, fit_candidates(magnitudes, rare, model, thorough=True, least=other))
-    return step.leaves_noise
-
-
-def _is_as_good(path: SelectionPath, found: SelectionPath) -> bool:
-    """One effect alone leaves noise in the whole band, as the other path does not, or is not less likely beyond doubt.
-    A rare one with another beside it would follow most that no vocabulary has."""
-    as_likely = path.as_recorded.evidence > found.as_recorded.evidence - THRESHOLDS.confounded
-    return len(path.added) == 1 and _leaves_noise(path) and (as_likely or not _leaves_noise(found))
-
-
-def _leaves_noise(path: SelectionPath) -> bool:
-    return path.final.white and all(np.isinf(record.below) for record in path.records)
+def _rank(one: CandidateFit) -> tuple[bool, float]:
+    """As in `fit_candidates`: what was only screened comes after what was fitted."""
+    return one.fit is None, -one.gain
