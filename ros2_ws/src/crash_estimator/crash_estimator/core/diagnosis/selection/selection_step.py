@@ -44,9 +44,13 @@ def in_recorded_noise(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: Sequence[SelectionStep] = (),
     fitted: bool = True,
 ) -> SelectionStep:  # fmt: skip
-    """All candidates against the sensors' noise; path: the steps before; fitted: not only screened."""
+    """All candidates against the sensors' noise; path: the steps before; fitted: not only screened.
+
+    With care where one would be believed beside those that were found, whatever it leaves.
+    """
     earlier = [one for step in path for one in step.candidates]
-    found = fit_candidates(magnitudes, effects, model, thorough=True, earlier=earlier, fitted=fitted)
+    thorough = len(path) < THRESHOLDS.most_at_once
+    found = fit_candidates(magnitudes, effects, model, thorough, earlier=earlier, fitted=fitted)
     return SelectionStep(model, found, found)
 
 
