@@ -104,3 +104,5 @@ def in_processes(function: Callable[..., dict], cases: list, processes: int, mar
     with pool:
         for row in pool.imap_unordered(function, cases):
             yield row | {"code": mark}
+        pool.close()
+        pool.join()  # where they are through they end by themselves: told to, they would say that they were interrupted

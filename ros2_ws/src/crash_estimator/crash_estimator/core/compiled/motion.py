@@ -7,6 +7,7 @@ from ..contact import REVERSAL
 from ..estimate import ElementState
 from ..kinematics import FEWEST, RATE_SMOOTHING
 from ..regression import QUIETEST, SHORTEST_CRUSH
+from ..regressor_errors import HIDDEN
 
 LOADING, UNLOADING, APART = (float(state) for state in ElementState)
 
@@ -144,7 +145,7 @@ def regress(plan, s, row, n, dt, time, w):
         for end in range(2):
             b = plan.ends[k, end]
             spread += plan.crush_of_body[k, b] ** 2 * errors[b, 5]
-        if plan.is_stiffness[j] and abs(lever[k]) < np.sqrt(spread):
+        if plan.is_stiffness[j] and abs(lever[k]) < HIDDEN * np.sqrt(spread):
             for i in range(q):
                 gradient[i, slot] = plan.share[i, k] * per_unit[j]
             continue
