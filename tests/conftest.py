@@ -3,11 +3,11 @@
 The imports are in the fixtures: what needs neither ROS nor the viewer does not wait for them.
 """
 
-import re
 import signal
 from collections import Counter
 
 import pytest
+from helpers_graph import NEEDS_A_GRAPH
 from hypothesis import settings
 
 # an example that takes long does so because the other test process, or somebody else, has the processor
@@ -18,12 +18,6 @@ settings.load_profile("no_deadline")
 for ending in (signal.SIGINT, signal.SIGHUP):
     if signal.getsignal(ending) is signal.SIG_IGN:
         signal.signal(ending, signal.default_int_handler if ending is signal.SIGINT else signal.SIG_DFL)
-
-
-NEEDS_A_GRAPH = re.compile(
-    r"\b(rclpy|crash_msgs|subprocess|stage)\b|helpers_(demo|diagnosis|domain|estimator_node|nodes|other_process|record|replay|service|waiting)"
-)
-"""What a file of tests mentions that starts nodes or other processes."""
 
 
 def pytest_addoption(parser):

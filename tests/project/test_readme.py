@@ -8,7 +8,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from conftest import NEEDS_A_GRAPH
+from helpers_graph import NEEDS_A_GRAPH
 from helpers_paths import ROOT
 from helpers_readme import COMMANDS, EXAMPLE, README, environment, needs_data
 from numpy.testing import assert_allclose
