@@ -107,20 +107,24 @@ def test_a_wrong_initial_velocity_is_counted_where_the_model_says_how_wrong(meth
     assert np.mean(inside[0.3]) > 0.8 > 0.6 > np.mean(inside[0.0])
 
 
+@pytest.mark.parametrize("seed", [3, 4, 5])
 @pytest.mark.parametrize("method", ["rls", "kalman", "constrained_kalman", "gauss_newton", "afmm"])
-def test_what_is_integrated_before_contact_tells_nothing_of_a_stiffness(method):
-    """Rib and spine rest until the door comes: their crush is error alone, and their stiffness stays as it was."""
+def test_what_is_integrated_before_contact_tells_little_of_a_stiffness_and_is_not_sure_of_it(method, seed):
+    """Rib and spine rest until the door comes: their crush is error alone, in which no stiffness can be seen."""
     structure, truth = load_model("side_dummy"), simulated("side_dummy_unpadded", False, False)
-    recording = recorded(truth, 2.0, 3)
+    recording = recorded(truth, 2.0, seed)
     before = recording.time_ns < 10_000_000
     recording = Recording(recording.test, recording.time_ns[before], recording.values[before])
     estimator = make_estimator(structure, recording.test, method)
-    state = estimator.init()
+    state, stated = estimator.init(), None
+    k = estimator.description.parameters.index("rib_spine.stiffness")
     for sample in recording.samples():
         state, estimate = estimator.step(state, sample)
-    k = estimator.description.parameters.index("rib_spine.stiffness")
+        stated = stated or float(np.sqrt(estimate.covariance[k, k]))
     assert estimate.crush[1] != 0.0
-    assert_allclose(estimate.parameters[k], 5.0e4, rtol=1e-12)  # afmm's is a mean of equal values
+    sigma = np.sqrt(estimate.covariance[k, k])
+    assert sigma > 0.6 * stated
+    assert abs(estimate.parameters[k] - 5.0e4) < sigma
 
 
 def oscillating(seed=0, noise=20.0):
@@ -141,7 +145,7 @@ def spring_estimator(recording, method, **settings):
 
 
 def test_the_printed_recursion_takes_the_integrated_motion_as_true():
-    """5.3 on the crush and rate as they were integrated, from the first sample on; ours is another."""
+    """5.3 on the crush and rate as they were integrated, from the first sample on; ours knows that they err."""
     recording, settings = oscillating(), {"preset": "thesis", "forgetting": 0.95}
     estimates = run(spring_estimator(recording, "rls", **settings), recording.samples())
     found = [e for e in estimates if e.time_ns > 0]
@@ -154,8 +158,8 @@ def test_the_printed_recursion_takes_the_integrated_motion_as_true():
         r = r + gamma * (np.outer(psi, psi) / big_lambda - r)
         theta = theta + gamma * np.linalg.solve(r, psi) * error / big_lambda
         assert_allclose(e.parameters, theta, rtol=1e-9)
-    held = run(spring_estimator(recording, "rls", regressor_errors=True, **settings), recording.samples())
-    assert np.abs(held[-1].parameters / theta - 1.0).max() > 1e-4
+    ours = run(spring_estimator(recording, "rls", regressor_errors=True, **settings), recording.samples())
+    assert (np.diagonal(ours[-1].covariance) > 1.001 * np.diagonal(found[-1].covariance)).all()
 
 
 @pytest.mark.parametrize("more", [{}, {"damping_after": 0.5}])

@@ -3,8 +3,8 @@
     y = measured - known,    Psi = d(prediction) / d(theta)
 
 A parameter that is known, or whose element is apart, has left Psi ("reduce" in figure 6.6); its value
-returns unchanged ("expand"). One whose crush or rate is not known beyond its own error (`KNOWN_FROM`) stays in Psi and
-is held: a method takes it as it is, not as known.
+returns unchanged ("expand"). A stiffness whose crush is hidden in its own error stays in Psi and is held: a method
+takes it as it is, not as known.
 """
 
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from .actions import Actions
 from .contact import SpringLaw
 from .estimate import ParameterStatus
 from .kinematics import Motion
-from .regressor_errors import KNOWN_FROM, MotionErrors
+from .regressor_errors import HIDDEN, MotionErrors
 from .structure import Parameter, Structure
 from .structure_parts import outlasts
 
@@ -112,7 +112,6 @@ class Regressor:
         self.factors = [(k, element.factor) for k, element in enumerate(structure.elements) if element.factor]
         self.share = structure.force_to_equation
         self.element = np.array([p.element for p in parameters], dtype=int)
-        self.is_damping = np.array([p.unit == "N*s/m" for p in parameters], dtype=bool)
         self.of_element = np.equal.outer(np.arange(len(structure.elements)), self.element).astype(float)
         self.is_stiffness = np.array([p.is_stiffness for p in parameters], dtype=bool)
         self.further = None if structure.first_order else Further(structure)
@@ -161,7 +160,7 @@ class Regressor:
             motion.sensors[1], motion.sensors[0] * motion.dt, self.velocity_variance, motion.time,
         )  # fmt: skip
         touched = self.estimated & carries
-        active = touched & ~self._vague(motion, law, errors) if self.regressor_errors else touched
+        active = touched & ~self._hidden(law, errors) if self.regressor_errors else touched
         known = self.share @ (forces.per_unit @ self.value + shift)
         measured = motion.measured
         if motion.applied is not None:
@@ -193,14 +192,9 @@ class Regressor:
             forces,
         )  # fmt: skip
 
-    def _vague(self, motion: Motion, law: SpringLaw, errors: MotionErrors) -> np.ndarray:
-        """(p,) Whether what a parameter is multiplied with is not known beyond its own error."""
-        of_crush, of_rate = errors.spread(self.crush_of_body)
-        return np.where(
-            self.is_stiffness,
-            (np.abs(law.lever) < KNOWN_FROM * of_crush)[self.element],
-            (np.abs(motion.rate) < KNOWN_FROM * of_rate)[self.element] & self.is_damping,
-        )
+    def _hidden(self, law: SpringLaw, errors: MotionErrors) -> np.ndarray:
+        """(p,) Whether it is a stiffness whose crush is hidden in its own error."""
+        return self.is_stiffness & (np.abs(law.lever) < HIDDEN * errors.of_crush(self.crush_of_body))[self.element]
 
     def corrected(self, motion: Motion, theta: np.ndarray, start: tuple[np.ndarray, np.ndarray]) -> Motion:
         """The motion without the errors of channels that are estimated; start: (b,) m and m/s at time zero."""

@@ -7,7 +7,7 @@ from ..contact import REVERSAL
 from ..estimate import ElementState
 from ..kinematics import FEWEST, RATE_SMOOTHING
 from ..regression import QUIETEST, SHORTEST_CRUSH
-from ..regressor_errors import KNOWN_FROM
+from ..regressor_errors import HIDDEN
 
 LOADING, UNLOADING, APART = (float(state) for state in ElementState)
 
@@ -141,11 +141,11 @@ def regress(plan, s, row, n, dt, time, w):
         walk[slot] = active[slot] = 0.0
         if not carries:
             continue
-        spread, size = 0.0, abs(lever[k] if plan.is_stiffness[j] else row.rate[k])
+        spread = 0.0
         for end in range(2):
             b = plan.ends[k, end]
-            spread += plan.crush_of_body[k, b] ** 2 * errors[b, 5 if plan.is_stiffness[j] else 3]
-        if size < KNOWN_FROM * np.sqrt(spread):
+            spread += plan.crush_of_body[k, b] ** 2 * errors[b, 5]
+        if plan.is_stiffness[j] and abs(lever[k]) < HIDDEN * np.sqrt(spread):
             for i in range(q):
                 gradient[i, slot] = plan.share[i, k] * per_unit[j]
             continue
