@@ -22,9 +22,9 @@ STRUCTURE = {"load_path": "dummy", "unmodelled_body": "single"}
 
 
 @cache
-def hidden(effect: str, structure: str):
+def hidden(effect: str, structure: str, seed: int = SEED):
     """-> the model without the effect, what was hidden, the recording, and whom it concerns besides its target."""
-    case = draw_case(structure, [effect], SEED)
+    case = draw_case(structure, [effect], seed)
     recording, _ = case.record(1.0, NOISE, RATE)
     model = ModelFile.model_validate(dict(case.specimen.model)).structure()
     more = {}
@@ -33,8 +33,8 @@ def hidden(effect: str, structure: str):
     return model, case.hidden[0], recording, more
 
 
-def with_it(effect: str, structure: str, coefficient: float | None):
-    model, what, recording, more = hidden(effect, structure)
+def with_it(effect: str, structure: str, coefficient: float | None, seed: int = SEED):
+    model, what, recording, more = hidden(effect, structure, seed)
     return add_effect(model, effect, what.target, EFFECTS, recording.test, coefficient, what.shape, **more)
 
 

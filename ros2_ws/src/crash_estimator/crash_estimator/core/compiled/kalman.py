@@ -137,7 +137,9 @@ def filtered(limits, method, f, dt, w, clamped, innovation_covariance, residual_
     )  # fmt: skip
     for i in range(q):
         if w.target[i] == w.target[i]:
-            pass_one(f.beside, f.shared, w.gain[:, i], w.gradient[i], w.by_errors[:, i], w.errors, w.unit)
+            for j in range(p):  # one at its bound counts as known, as it does in P
+                w.seen[j] = 0.0 if clamped[j] else w.gradient[i, j]
+            pass_one(f.beside, f.shared, w.gain[:, i], w.seen, w.by_errors[:, i], w.errors, w.unit)
     _left(f, w, residual_std)
     if method.noise_memory > 0.0:
         share = dt / (dt + method.noise_memory)

@@ -101,6 +101,7 @@ SCRATCH: Shapes = {
     "before": ("unknowns",),
     "through": ("equations", "unknowns"),
     "gain": ("unknowns", "equations"),
+    "seen": ("unknowns",),
     "unit": ("unknowns",),
     "unfiltered": ("unknowns",),
     "spread": ("equations", "equations"),

@@ -116,7 +116,8 @@ class Kalman:
         expected, expected_after = gradient[:, p:] @ offsets, gradient[:, p:] @ both[p:]
         residual = target - regression.gradient @ updated - expected_after
         products = residual * (target - regression.gradient @ theta - expected)
-        beside = self._beside(state, regression, gradient, gains)
+        seen = np.where(np.concatenate([~clamped, always]), gradient, 0.0)  # one at its bound counts as known, as it does in P
+        beside = self._beside(state, regression, seen, gains)
         left = residual_variance(noise, gradient, covariance_of(root), _influence(gradient, target, gains))
         root = np.hstack([root, self._constant_walk(regression, len(root))])
         state = KalmanState(updated, narrowed(root), both[p:], self._adapt(noise, products, regression), beside)
