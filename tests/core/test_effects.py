@@ -62,6 +62,7 @@ def test_forces_have_the_sizes_of_their_equations():
     here = motion([0.2, 0.2], [3.0, -3.0])
     assert_allclose(EFFECTS["viscous_damping"].force(here), [3.0, -3.0])
     assert_allclose(EFFECTS["quadratic_damping"].force(here), [9.0, -9.0])
+    assert_allclose(EFFECTS["quadratic_damping"].force(here, stroke=0.4), [36.0, -36.0])
     assert_allclose(EFFECTS["coulomb_friction"].force(here, speed=0.1), [1.0, -1.0])
     assert_allclose(EFFECTS["cubic_stiffness"].force(here), [8e-3, 8e-3])
     assert_allclose(EFFECTS["bottoming_out"].force(motion([0.1, 0.2], [1.0, 1.0]), stop=0.15), [0.0, 0.05], atol=1e-15)

@@ -44,6 +44,7 @@ def written(found: Diagnosis, model: str, folder) -> Structure:
         ("side/force.rising/1g/clean/71700002", "rising", "nothing"),
         ("sled/cubic.inside/0.5g/clean/71700003", "in_curve", "nothing"),
         ("wall/cubic.beside/0.5g/clean/71700004", "", "springs"),
+        ("side/damper.metered/1g/clean/71700005", "metered", "nothing"),
     ],
 )
 def test_the_form_of_a_law_is_found_and_can_be_read_back(name, form, contacts, tmp_path):
@@ -63,6 +64,13 @@ def test_the_form_of_a_law_is_found_and_can_be_read_back(name, form, contacts, t
     for recording in case.recordings:  # and an estimator can follow it
         estimator = make_estimator(structure, recording.test, "rls")
         assert all(np.isfinite(estimate.parameters).all() for estimate in run(estimator, recording.samples()))
+
+
+def test_a_law_that_another_one_imitates_is_named_beside_it():
+    """A spring behind a dry slider that slips once is an unloading line: both leave noise, and both are said."""
+    _, found = found_in("wall/hysteresis.slider/1g/clean/71000002")
+    first = found.ranking[0]
+    assert {first.effect, *(name.partition(" on ")[0] for name in first.confounded_with)} == {"plastic_unloading", "hysteresis"}
 
 
 def test_dampers_that_pull_until_the_crush_is_gone_are_those_of_our_own_bag(tmp_path):

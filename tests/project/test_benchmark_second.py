@@ -50,7 +50,7 @@ def test_a_stop_where_the_hidden_gap_closes_is_that_gap(stop, counts):
 
 
 def test_each_kind_has_its_wanted_answer():
-    nothing, outside = "side/nothing/1g/ringing/5", "side/outside.metered/1g/clean/5"
+    nothing, outside = "side/nothing/1g/ringing/5", "side/outside.losing/1g/clean/5"
     assert wanted(row(nothing, "adequate", expected=[])) and not wanted(row(nothing, "unexplained", expected=[]))
     assert wanted(row(outside, "adequate", expected=[])) and wanted(row(outside, "unexplained", expected=[]))
     assert not wanted(row(outside, expected=[])) and not wanted(row(outside, "error", expected=[]))
@@ -74,7 +74,7 @@ def test_page_counts_what_the_rows_say():
     rows = [
         row(), row("side/friction.dahl/2g/clean/6", first=("viscous_damping", "rib_spine")),
         row("side/nothing/1g/ringing/7", "adequate", expected=[]),
-        row("side/outside.metered/1g/clean/8", first=("rate_hardening", "door_rib"), expected=[]),
+        row("side/outside.losing/1g/clean/8", first=("rate_hardening", "door_rib"), expected=[]),
         row("side/friction.dahl/1g/clipped/9", "adequate"),
         {"case": "wall/mass.rigid/1g/clean/10", "not_drawn": "not seen"},
     ]  # fmt: skip
@@ -84,7 +84,7 @@ def test_page_counts_what_the_rows_say():
     assert "| wrong without its rival named | at most 1 % | 50 % (9 to 91) of 2 |" in text
     assert "| `adequate` where nothing is hidden | 97 % | 100 % (21 to 100) of 1 |" in text
     assert "| sensors in trouble: wrong `adequate` | none | 1/1 |" in text
-    assert "| `outside.metered` | 1/1 | 0/1 | 0/1 | 0/1 | rate_hardening on door_rib |" in text
+    assert "| `outside.losing` | 1/1 | 0/1 | 0/1 | 0/1 | rate_hardening on door_rib |" in text
     assert "0 cases judged" in page([], 0, "abc")
 
 

@@ -137,6 +137,17 @@ class Orifice(Turning):
         return self.q * v * abs(v)
 
 
+@dataclass(frozen=True)
+class MeteringPin(Turning):
+    """F = c v |v| / (1 - x / l)^2: an orifice that closes with its travel, as of a buffer with a metering pin."""
+
+    c: float
+    length: float
+
+    def force(self, x: float, v: float, z: Z, mode: int) -> float:
+        return self.c * v * abs(v) / max(1.0 - max(x, 0.0) / self.length, 0.05) ** 2
+
+
 # --- elastic, beside the curve
 
 

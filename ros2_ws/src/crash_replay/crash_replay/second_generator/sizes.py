@@ -211,7 +211,7 @@ def rattling(base: Base) -> Setup:
 
 def metered(base: Base) -> branches.Branch:
     c = base.share(0.15, 0.3) * base.peak.f / base.peak.v**2
-    return strange.MeteringPin(c, base.share(1.3, 1.8) * base.peak.x)
+    return branches.MeteringPin(c, base.share(1.3, 1.8) * base.peak.x)
 
 
 def sloshing(base: Base) -> Setup:

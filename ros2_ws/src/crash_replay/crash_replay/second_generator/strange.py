@@ -52,14 +52,3 @@ class Rattle(Branch):
 
     def switched(self, guard: int, x: float, v: float, z: Z, mode: int) -> int:
         return 0 if mode else (1, -1)[guard]
-
-
-@dataclass(frozen=True)
-class MeteringPin(Branch):
-    """F = c v |v| / (1 - x / l)^2: an orifice that closes with its travel, as of a buffer with a metering pin."""
-
-    c: float
-    length: float
-
-    def force(self, x: float, v: float, z: Z, mode: int) -> float:
-        return self.c * v * abs(v) / max(1.0 - max(x, 0.0) / self.length, 0.05) ** 2

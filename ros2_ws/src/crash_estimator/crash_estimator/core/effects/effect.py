@@ -13,7 +13,7 @@ whole records (arrays) and read the history, which is made once, causally, elsew
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
@@ -69,6 +69,8 @@ class Effect:
     size: float | None = None  # order of magnitude of the coefficient; None: what carries half of the target's force
     of_crush_only: bool = False  # its force is a function of the crush alone
     rare: bool = False  # looked for only where the others leave more than noise, or take several to leave it
+    forms: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """Name of a form of its law -> names of its shape constants, where it has several; all but the first are rare."""
 
     # What it acts on
     acts_on: ClassVar[str] = "element"  # the key of a model file: element, body, channel or between
@@ -87,9 +89,13 @@ class Effect:
     replaces: ClassVar[str] = ""  # the element's key in a model file that it takes the place of
 
     # How a diagnosis searches for it
-    variants: ClassVar[tuple[str, ...]] = ("",)  # ways in which it may act on one target
     profiled: ClassVar[bool] = False  # its coefficient says when a force jumps to zero: the cost has a V over it
     restated: ClassVar[bool] = False  # the literature states the coefficient otherwise than it is fitted
+
+    @property
+    def variants(self) -> tuple[str, ...]:
+        """Ways in which it may act on one target."""
+        return tuple(self.forms) or ("",)
 
     def possible_targets(self, structure: Structure, test: Test | None) -> list[str] | None:
         """All that it can act on; None: any channel that the model does not use, of a test that is not known."""
@@ -101,7 +107,7 @@ class Effect:
 
     def shapes_of(self, variant: str) -> Mapping[str, Shape]:
         """The shape constants that it has in one of its variants."""
-        return self.shapes
+        return {name: self.shapes[name] for name in self.forms[variant]} if self.forms else self.shapes
 
     def trial(self, motion: ElementMotion, **shapes: float) -> np.ndarray:
         """What its function gives on a motion that a user's effect is tried on."""
@@ -109,7 +115,9 @@ class Effect:
 
     def common(self) -> "Effect | None":
         """What of it is looked for first: all of it, or None of a rare one; of several forms it may be some."""
-        return None if self.rare else self
+        if self.rare or len(self.forms) < 2:
+            return None if self.rare else self
+        return replace(self, forms=dict(list(self.forms.items())[:1]))
 
     def put_to_work(self, structure: Structure, test: Test, spec: EffectSpec) -> Structure:
         """The structure as estimators and free runs take it: with this effect in its elements, masses or actions.

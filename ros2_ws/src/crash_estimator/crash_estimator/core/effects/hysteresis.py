@@ -34,5 +34,5 @@ EFFECT = RememberingForce(
         "exponent": Shape("", 1.0, 10.0, (2.0,)),
     },
     memory=memory,
-    forms=("dahl",),
+    ways=("dahl",),
 )

@@ -84,7 +84,10 @@ def fit_candidates(
             lambda: search.anew(LARGE_NOISE),
         )
         for harder in (*with_care, *more_of_them):
-            if out_of_time() or search.reached_the_floor():
+            if out_of_time():
+                break
+            if search.reached_the_floor():
+                search.rival_with_care()
                 break
             if search.out_of_reach() and (harder in more_of_them or earlier or search.explains_most()):
                 break
@@ -163,6 +166,18 @@ class _Search:
         """Fit the best ones from the measured motion by another schedule."""
         for one in self._best():
             self._fit(one.addition, None, schedule)
+
+    def rival_with_care(self) -> None:
+        """Fit another law on the same target that comes near the best one as carefully as that may need: what looks
+        like the second is else not told from it."""
+        best, *others = [one for one in self.ranking() if one.fit]
+        near = (one for one in others if one.addition.target == best.addition.target)
+        rival = next(near, None)
+        if rival and rival.gain > THRESHOLDS.named_share * best.gain:
+            self.from_motion((one for one in self.screened if one.addition.key == rival.addition.key), SMALL_STEPS)
+            rival = self.found[rival.addition.key]
+            on = fit(rival.fit.problem, rival.fit.point, SLOW_CONTACT, most=2 * MOST_ITERATIONS)
+            self._note(rival.addition, on)
 
     def _best(self) -> list[CandidateFit]:
         return [one for one in self.ranking() if one.fit][: THRESHOLDS.with_care]

@@ -35,7 +35,7 @@ class ElementForce(Effect):
 
     @property
     def variants(self):
-        return ("", IN_CURVE) if self.of_crush_only else ("",)
+        return ("", IN_CURVE) if self.of_crush_only else super().variants
 
     def put_to_work(self, structure, test, spec):
         k, force = element_index(structure, spec.target), partial(self.force, **spec.shape)
@@ -53,7 +53,8 @@ class ElementForce(Effect):
             # a free curve of an elastic element contains a function of the crush alone
             contained = self.of_crush_only and free_curve and not element.unloading
             if not (contained or (self.doubles and getattr(element, self.doubles).estimated)):
-                for variant in self.variants if element.unloads and not free_curve else ("",):
+                beside_only = self.of_crush_only and (free_curve or not element.unloads)
+                for variant in ("",) if beside_only else self.variants:
                     yield from on_element(self, magnitudes, element.name, variant)
 
     def prior_std(self, magnitudes, addition):

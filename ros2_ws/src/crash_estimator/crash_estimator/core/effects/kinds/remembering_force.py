@@ -23,14 +23,14 @@ class RememberingForce(Effect):
     """
 
     memory: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] | None = None
-    forms: tuple[str, ...] = ()  # beside the usual one
+    ways: tuple[str, ...] = ()  # forms beside the usual one, with the same shape constants, as common as that
     bounded: bool = True  # z is within -1 and 1
 
     remembers: ClassVar[bool] = True
 
     @property
     def variants(self):
-        return ("", *self.forms)
+        return ("", *self.ways)
 
     def put_to_work(self, structure, test, spec):
         k = element_index(structure, spec.target)

@@ -1,7 +1,7 @@
 """A factor 1 + c h(V) on an element's static force."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
 
@@ -19,28 +19,15 @@ class StaticFactor(Effect):
 
     factor(rate (g,) m/s, **shape constants) -> (g,) h per unit of c;
     stated(c, **shape constants) -> the coefficient as the literature states it, and `unstated` back.
-
-    Its forms, where it has several, differ by their shape constants; the first is the common one.
     """
 
     factor: Callable[..., np.ndarray] | None = None
     stated: Callable[..., float] = lambda c: c
     unstated: Callable[..., float] = lambda value: value
-    forms: Mapping[str, Sequence[str]] = field(default_factory=dict)  # form -> names of its shape constants
 
     function: ClassVar[str] = "factor"
     scales_static: ClassVar[bool] = True
     restated: ClassVar[bool] = True
-
-    @property
-    def variants(self):
-        return tuple(self.forms) or ("",)
-
-    def shapes_of(self, variant):
-        return {name: self.shapes[name] for name in self.forms[variant]} if self.forms else self.shapes
-
-    def common(self):
-        return replace(self, forms=dict(list(self.forms.items())[:1]))
 
     def stated_limits(self):
         return 0.0, np.inf
