@@ -70,7 +70,8 @@ def test_a_law_that_another_one_imitates_is_named_beside_it():
     """A spring behind a dry slider that slips once is an unloading line: both leave noise, and both are said."""
     _, found = found_in("wall/hysteresis.slider/1g/clean/71000002")
     first = found.ranking[0]
-    assert {first.effect, *(name.partition(" on ")[0] for name in first.confounded_with)} == {"plastic_unloading", "hysteresis"}
+    said = {first.effect, *(name.partition(" on ")[0] for name in first.confounded_with)}
+    assert said == {"plastic_unloading", "hysteresis"}
 
 
 def test_dampers_that_pull_until_the_crush_is_gone_are_those_of_our_own_bag(tmp_path):

@@ -25,6 +25,9 @@ LARGEST_MAGNITUDE_ERROR, LARGEST_SLOPE_ERROR = 0.5, 2.0
 SMOOTHING = 9
 """Samples over which slopes are averaged; fewer at the ends."""
 
+ROUNDING = 1e-12
+"""Correlations closer than this are the same."""
+
 GRADES = ((0.94, "excellent"), (0.80, "good"), (0.58, "fair"), (-1.0, "poor"))
 """Of the overall rating, the sliding scale of the standard."""
 
@@ -76,20 +79,27 @@ def _corridor(reference: np.ndarray, comparison: np.ndarray) -> float:
 
 def _shift(reference: np.ndarray, comparison: np.ndarray) -> int:
     """Samples by which the comparison is late, within a fifth of the length; the smallest of equally good ones."""
-    best, shift = _correlation(reference, comparison), 0
-    for k in range(1, int(np.floor(LARGEST_SHIFT * len(reference))) + 1):
-        for late, t, c in ((k, reference[:-k], comparison[k:]), (-k, reference[k:], comparison[:-k])):
-            correlation = _correlation(t, c)
-            if correlation > best:
-                best, shift = correlation, late
-    return shift
+    n = len(reference)
+    shifts = np.arange(1 - n, n)
+    shared = n - np.abs(shifts)
+    t, c = reference - reference.mean(), comparison - comparison.mean()
 
+    def over_shared(values: np.ndarray, late: np.ndarray) -> np.ndarray:
+        """Sums over what a signal shares with the other one, by shift."""
+        sums = np.concatenate([[0.0], np.cumsum(values)])
+        first = np.maximum(late, 0)
+        return sums[first + shared] - sums[first]
 
-def _correlation(t: np.ndarray, c: np.ndarray) -> float:
-    """Pearson's coefficient; -1 where one signal is constant and has none."""
-    t, c = t - t.mean(), c - c.mean()
-    scale = np.sqrt((t @ t) * (c @ c))
-    return float(t @ c / scale) if scale > 0.0 else -1.0
+    of_t, of_c = over_shared(t, -shifts), over_shared(c, shifts)
+    together = np.correlate(c, t, "full") - of_t * of_c / shared
+    spread = [over_shared(x * x, late) - sums**2 / shared for x, late, sums in ((t, -shifts, of_t), (c, shifts, of_c))]
+    scale = np.sqrt(np.maximum(spread[0], 0.0) * np.maximum(spread[1], 0.0))
+    flat = scale <= ROUNDING * n * np.abs(t).max() * np.abs(c).max()  # a constant signal has no correlation
+    pearson = np.where(flat, -1.0, together / np.where(flat, 1.0, scale))
+    within = np.flatnonzero(np.abs(shifts) <= int(np.floor(LARGEST_SHIFT * n)))
+    nearest = within[np.argsort(np.abs(shifts[within]) - 0.5 * (shifts[within] > 0))]
+    best = pearson[nearest] >= pearson[nearest].max() - ROUNDING
+    return int(shifts[nearest[np.argmax(best)]])
 
 
 def _score(comparison: np.ndarray, reference: np.ndarray, largest: float) -> float:
@@ -108,24 +118,11 @@ def _smoothed(slope: np.ndarray) -> np.ndarray:
 
 
 def _warped(c: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The two signals along the path of least summed squared difference within the band.
+    """The two signals along the path of least summed squared difference within the band."""
+    from .time_warping import warping_path  # the compiler takes long to import: only who needs it waits for it
 
-    Row by row, D_j = d_j + min(b_j, D_{j-1}) with b the cheapest way down from the row above; with the sums
-    S = cumsum(d) this is D_j = S_j + min over k <= j of (b_k - S_{k-1}), one pass for a whole row.
-    """
     n = len(t)
     radius = min(n, max(1, int(np.ceil(WARPING * n)))) - 1
-    total = np.full((n + 1, n + 1), np.inf)
-    total[0, 0] = 0.0
-    for i in range(n):
-        first, last = max(0, i - radius), min(n, i + radius + 1)
-        sums = np.concatenate([[0.0], np.cumsum((c[i] - t[first:last]) ** 2)])
-        down = np.minimum(total[i, first + 1 : last + 1], total[i, first:last])
-        total[i + 1, first + 1 : last + 1] = sums[1:] + np.minimum.accumulate(down - sums[:-1])
-    path = [(n - 1, n - 1)]
-    while path[-1] != (0, 0):
-        i, j = path[-1]
-        ways = ((i - 1, j), (i, j - 1), (i - 1, j - 1))  # equally cheap: the standard's order
-        path.append(min(ways, key=lambda way: total[way[0] + 1, way[1] + 1] if min(way) >= 0 else np.inf))
-    rows, columns = np.array(path).T
+    c, t = (np.ascontiguousarray(x, dtype=float) for x in (c, t))
+    rows, columns = warping_path(c, t, radius)
     return c[rows], t[columns]

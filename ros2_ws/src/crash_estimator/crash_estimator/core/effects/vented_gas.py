@@ -14,24 +14,47 @@ LEAST = 0.02
 SLIGHT = 1e-3
 """Overpressure from which on the flow goes with its root; below, as through any hole, with itself."""
 
-SMALL, SMALL_CRUSH = 1e-6, 1e-7
-"""Of y, and m: steps of the one-sided differences."""
-
 
 @njit(cache=True)
 def _room(crush, length):
-    return max(1.0 - max(crush, 0.0) / length, LEAST)
+    """Share of its length that a crush leaves of the cushion, and its derivative by the crush."""
+    left = 1.0 - max(crush, 0.0) / length
+    return (left, -1.0 / length if crush > 0.0 else 0.0) if left > LEAST else (LEAST, 0.0)
+
+
+@njit(cache=True)
+def _flow(y, leak):
+    """What leaves, in 1/s, and its derivative by y."""
+    root = np.sqrt(y + SLIGHT)
+    return leak * y / root, leak * (0.5 * y + SLIGHT) / root**3
+
+
+@njit(cache=True)
+def _pressed(gas, room):
+    """The overpressure y of gas in a room, and its derivative by gas / room."""
+    dense = max(gas, 0.0) / room
+    y = dense**KAPPA - 1.0
+    return (y, KAPPA * (y + 1.0) / dense) if y > 0.0 else (0.0, 0.0)
 
 
 @njit(cache=True)
 def _advanced(y, before, now, step, length, leak):
-    """y after a step from one crush to another, by the midpoint rule."""
-    first, last = _room(before, length), _room(now, length)
-    gas = first * (1.0 + y) ** (1.0 / KAPPA)
-    half = max(gas - 0.5 * step * leak * y / np.sqrt(y + SLIGHT), 0.0)
-    middle = max((half / (0.5 * (first + last))) ** KAPPA - 1.0, 0.0)
-    gas = max(gas - step * leak * middle / np.sqrt(middle + SLIGHT), 0.0)
-    return max((gas / last) ** KAPPA - 1.0, 0.0)
+    """y after a step from one crush to another, by the midpoint rule, and its derivatives by y, `now` and `before`."""
+    (first, by_before), (last, by_now) = _room(before, length), _room(now, length)
+    dense = (1.0 + y) ** (1.0 / KAPPA)
+    gas, gas_by_y = first * dense, first * dense / (KAPPA * (1.0 + y))
+    flow, flow_by_y = _flow(y, leak)
+    half, half_by_y = gas - 0.5 * step * flow, gas_by_y - 0.5 * step * flow_by_y
+    between = 0.5 * (first + last)
+    middle, steep = _pressed(half, between)
+    flow, slope = _flow(middle, leak)
+    slope *= step * steep / between  # of what leaves, by the gas half-way
+    narrower = 0.5 * slope * half / between
+    gas, gas_by_y = gas - step * flow, gas_by_y - slope * half_by_y
+    y, steep = _pressed(gas, last)
+    steep /= last
+    by_first, by_last = steep * (dense - slope * dense + narrower), steep * (narrower - gas / last)
+    return y, steep * gas_by_y, by_last * by_now, by_first * by_before
 
 
 @njit(cache=True)
@@ -41,9 +64,6 @@ def trace(step, crush, start, length, leak):
     y, by_y, by_crush, by_before = np.empty(g), np.ones(g), np.zeros(g), np.zeros(g)
     y[0] = start
     for t in range(1, g):
-        h, last, now = step[t], crush[t - 1], crush[t]
-        y[t] = _advanced(y[t - 1], last, now, h, length, leak)
-        by_y[t] = (_advanced(y[t - 1] + SMALL, last, now, h, length, leak) - y[t]) / SMALL
-        by_crush[t] = (_advanced(y[t - 1], last, now + SMALL_CRUSH, h, length, leak) - y[t]) / SMALL_CRUSH
-        by_before[t] = -(_advanced(y[t - 1], last + SMALL_CRUSH, now, h, length, leak) - y[t]) / SMALL_CRUSH
+        y[t], by_y[t], by_crush[t], before = _advanced(y[t - 1], crush[t - 1], crush[t], step[t], length, leak)
+        by_before[t] = -before
     return y, by_y, by_crush, by_before

@@ -116,7 +116,8 @@ class Kalman:
         expected, expected_after = gradient[:, p:] @ offsets, gradient[:, p:] @ both[p:]
         residual = target - regression.gradient @ updated - expected_after
         products = residual * (target - regression.gradient @ theta - expected)
-        seen = np.where(np.concatenate([~clamped, always]), gradient, 0.0)  # one at its bound counts as known, as it does in P
+        # one at its bound counts as known, as it does in P
+        seen = np.where(np.concatenate([~clamped, always]), gradient, 0.0)
         beside = self._beside(state, regression, seen, gains)
         left = residual_variance(noise, gradient, covariance_of(root), _influence(gradient, target, gains))
         root = np.hstack([root, self._constant_walk(regression, len(root))])
