@@ -14,7 +14,7 @@ from ...structure import ModelError, Structure
 from ..observation.pace import at_its_own_pace
 from ..observation.record import ObservedRecord, observe
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
-from ..residuals.residuals import free_run, noise_floor
+from ..residuals.residuals import analyse, free_run, noise_floor
 from ..residuals.score_test import drift_of
 from ..selection.acceptance import share_removed
 from ..selection.assumptions import SelectionPath, first_believed, select, up_to
@@ -23,7 +23,7 @@ from ..selection.rare_effects import common_effects
 from ..selection.selection_step import fit_of_all
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_limit import out_of_time, time_limit
-from ..selection.time_zero import Shift, TimeZero, moved_by, onsets_elsewhere, time_zero_wrong
+from ..selection.time_zero import Shift, TimeZero, moved_by, onsets, sharpened, time_zero_wrong
 from .left import Left, band_of, left_by
 from .model_effects import structure_with
 from .ranking import Ranked, StepReport, ranking_of, step_of
@@ -107,6 +107,9 @@ def diagnose(
     with time_limit(seconds):
         records, zero, unused = _observed(structure, recordings, common_effects(structure, effects))
         path = first_believed(select(structure, records, effects))
+        if zero or unused:
+            sharper = _from_a_sharper_time_zero(structure, recordings, effects, path, zero)
+            path, zero, unused = sharper or (path, zero, unused)
         stopped = out_of_time()
     found = _answer(structure, path, tolerance, zero)
     remarks = [clipped] if clipped else []
@@ -122,18 +125,47 @@ def _observed(
 ) -> tuple[list[ObservedRecord], TimeZero | None, tuple[Shift, ...]]:
     """The recordings from the stated time zero on, or from their onset where that comes first and the model leaves less
     of them so; and onsets elsewhere that they are not taken from."""
-
-    def observed(recordings: Sequence[Recording]) -> list[ObservedRecord]:
-        return [observe(structure, at_its_own_pace(structure, recording)) for recording in recordings]
-
-    records, elsewhere = observed(recordings), onsets_elsewhere(recordings)
+    records, elsewhere = _from(structure, recordings), onsets(recordings)
     early = tuple(shift for shift in elsewhere if shift.seconds < -records[shift.recording].seen_early)
     if early:
-        from_onset = observed(moved_by(early, recordings))
+        from_onset = _from(structure, recordings, early)
         zero = time_zero_wrong(structure, records, from_onset, early, effects)
         if zero:
             return from_onset, zero, tuple(shift for shift in elsewhere if shift not in early)
     return records, None, elsewhere
+
+
+def _from(structure: Structure, recordings: Sequence[Recording], shifts: Sequence[Shift] = ()) -> list[ObservedRecord]:
+    return [observe(structure, at_its_own_pace(structure, one)) for one in moved_by(shifts, recordings)]
+
+
+def _from_a_sharper_time_zero(
+    structure: Structure, recordings: Sequence[Recording], effects: Mapping[str, Effect], found: SelectionPath,
+    zero: TimeZero | None,
+) -> tuple[SelectionPath, TimeZero, tuple[Shift, ...]] | None:  # fmt: skip
+    """What is found from where the motion with the first effect that was found begins: where that leaves noise, as what
+    was found does not, or does with more effects. Twice, as what came first may have been found for the time zero."""
+    begins = onsets(recordings, as_well=True)
+    used = {shift.recording: shift.seconds for shift in zero.shifts} if zero else {}
+    shifts = tuple(shift._replace(seconds=used.get(shift.recording, 0.0)) for shift in begins)
+    as_stated = zero.as_stated if zero else found.steps[0].before
+    most = len(found.added) - 1 if found.noise else THRESHOLDS.most_steps  # effects that would be an improvement
+
+    def observed(shifts: Sequence[Shift]) -> list[ObservedRecord]:
+        return _from(structure, recordings, shifts)
+
+    path = found
+    for _ in range(2 if most else 0):
+        if analyse(path.as_recorded).mean_square >= THRESHOLDS.real_structure or out_of_time():
+            return None
+        additions = (*path.final.additions[: path.present], *path.added[:1])
+        shifts, gain = sharpened(begins, shifts, path.structure, additions, observed)
+        if not gain > THRESHOLDS.gain:
+            return None
+        path = first_believed(select(structure, observed(shifts), effects))
+        if path.noise:
+            return (path, TimeZero(shifts, as_stated), ()) if len(path.added) <= most else None
+    return None
 
 
 def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zero: TimeZero | None) -> Diagnosis:

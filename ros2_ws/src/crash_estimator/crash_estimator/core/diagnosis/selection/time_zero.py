@@ -2,10 +2,15 @@
 
 Whoever states it reads a contact switch, a flash or a curve, and may be some ms off. Where the signals begin before it,
 no model can follow: its bodies are at rest, or coast, until then. Where they begin after it, a gap that closes says the
-same, and a delay; that is told, and left to them.
+same, and a delay; that is told, and left to them, unless only from the onset on nothing but noise is left.
+
+An onset is where signals stand out of their noise, which a rise that begins gently does late. A model that
+is right says sharper when its motion began: what it leaves is least from there on.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +18,7 @@ import numpy as np
 from crash_replay.onset import AS_WELL, find_onset
 from crash_replay.recording import Recording
 
-from ...effects.effect import Effect
+from ...effects.effect import Addition, Effect
 from ...structure import Structure
 from ..observation.record import ObservedRecord
 from ..parameterization.magnitudes import measure_magnitudes
@@ -21,6 +26,14 @@ from ..parameterization.model_terms import additions_of
 from .assumptions import CELLS
 from .fitted_model import Model, fit_model
 from .thresholds import THRESHOLDS
+from .time_limit import out_of_time
+
+BETWEEN = 12.0**-0.5
+"""Standard deviation, in samples, of an instant between two of them."""
+
+
+FARTHEST = 6.0
+"""Standard deviations that an onset may be off: twice as far as any that fits its signals as well."""
 
 
 class Shift(NamedTuple):
@@ -30,6 +43,7 @@ class Shift(NamedTuple):
     test: str
     seconds: float  # from the stated one to the onset
     std: float  # s
+    period: float  # s, of its samples
 
 
 class TimeZero(NamedTuple):
@@ -44,15 +58,14 @@ class TimeZero(NamedTuple):
         return float(bins * np.log(self.as_stated.residuals.rms / moved.residuals.rms))
 
 
-def onsets_elsewhere(recordings: Sequence[Recording]) -> tuple[Shift, ...]:
-    """Of the recordings whose signals begin elsewhere than at the stated time zero."""
+def onsets(recordings: Sequence[Recording], as_well: bool = False) -> tuple[Shift, ...]:
+    """Of the recordings whose signals begin elsewhere than at the stated time zero; as_well: or that may do so."""
     shifts = []
     for k, recording in enumerate(recordings):
         onset = find_onset(recording)
-        if onset is not None and onset.differs:
-            least = recording.sample_period / np.sqrt(12.0)  # an instant between two samples
-            std = max(onset.precision_ns * 1e-9 / np.sqrt(AS_WELL), least)
-            shifts.append(Shift(k, recording.test.id, onset.time_ns * 1e-9, float(std)))
+        if onset is not None and (onset.differs or (as_well and abs(onset.time_ns) > 1e9 * recording.sample_period)):
+            std = max(onset.precision_ns * 1e-9 / np.sqrt(AS_WELL), recording.sample_period * BETWEEN)
+            shifts.append(Shift(k, recording.test.id, onset.time_ns * 1e-9, float(std), recording.sample_period))
     return tuple(shifts)
 
 
@@ -77,3 +90,60 @@ def time_zero_wrong(
     as_stated, from_onset = models
     zero = TimeZero(shifts, as_stated)
     return zero if zero.gain(from_onset) > THRESHOLDS.gain else None
+
+
+def sharpened(
+    onsets: Sequence[Shift], stated: Sequence[Shift], structure: Structure, additions: Sequence[Addition],
+    observed: Callable[[Sequence[Shift]], Sequence[ObservedRecord]],
+) -> tuple[tuple[Shift, ...], float]:  # fmt: skip
+    """The likeliest shifts for the structure with some additions; and what they gain over those stated, in nats.
+
+    The logarithm of the likelihood is that of what is left from there on, in noise as large as that, and of the onsets,
+    each with its standard deviation: free curves may begin before there is any force, and do not tell when.
+
+    A pattern search to the sample (Hooke and Jeeves 1961), each recording's in turn and all together: from its onset,
+    or from what is stated of it, in steps that are halved, the first as long as its onset may be wrong by. The standard
+    deviations are those of a parabola through the samples next to it. observed(shifts) -> the records.
+    """
+    bins = sum(record.bins * record.measured.shape[1] for record in observed(stated))
+
+    @cache
+    def unlikely(shifts: tuple[Shift, ...]) -> float:
+        """Twice the negative logarithm of the likelihood, less constants."""
+        pairs = list(zip(shifts, onsets, strict=True))
+        if any(abs(one.seconds - onset.seconds) > abs(onset.seconds) + FARTHEST * onset.std for one, onset in pairs):
+            return np.inf
+        records = observed(shifts)
+        rms = fit_model(measure_magnitudes(structure, records, CELLS), records, additions).residuals.rms
+        off = sum(((one.seconds - onset.seconds) / onset.std) ** 2 for one, onset in pairs)
+        return 2.0 * bins * float(np.log(rms)) + off if np.isfinite(rms) else np.inf
+
+    def moved(shifts: tuple[Shift, ...], which: Sequence[int], samples: int) -> tuple[Shift, ...]:
+        by = [samples * one.period if k in which else 0.0 for k, one in enumerate(shifts)]
+        return tuple(one._replace(seconds=one.seconds + s) for one, s in zip(shifts, by, strict=True))
+
+    each, together = [(k,) for k in range(len(onsets))], tuple(range(len(onsets)))
+    best = tuple(stated)
+    for k, onset in enumerate(onsets):
+        best = min((best, (*best[:k], onset, *best[k + 1 :])), key=unlikely)
+    step = max(1, *(int(onset.std / onset.period) for onset in onsets))
+    while step and not out_of_time():
+        before = best
+        for which in [*each, together]:
+            best = min((best, moved(best, which, -step), moved(best, which, step)), key=unlikely)
+        step //= 1 if best != before else 2
+
+    least, later = unlikely(best), [unlikely(moved(best, which, 1)) for which in each]
+    bent = np.diag([unlikely(moved(best, which, -1)) + up - 2.0 * least for which, up in zip(each, later, strict=True)])
+    for i, j in combinations(range(len(onsets)), 2):
+        bent[i, j] = bent[j, i] = unlikely(moved(best, (i, j), 1)) - later[i] - later[j] + least
+    stds = _stds(0.5 * bent, [onset.std / onset.period for onset in onsets])
+    found = tuple(one._replace(std=one.period * max(BETWEEN, std)) for one, std in zip(best, stds, strict=True))
+    return found, 0.5 * (unlikely(tuple(stated)) - least)
+
+
+def _stds(precision: np.ndarray, otherwise: Sequence[float]) -> Sequence[float]:
+    """Of (n,) with the inverse covariance (n, n); `otherwise` where that is none."""
+    if not np.isfinite(precision).all() or np.linalg.eigvalsh(precision)[0] <= 0.0:
+        return otherwise
+    return np.sqrt(np.diagonal(np.linalg.inv(precision))).tolist()
