@@ -19,7 +19,7 @@ DEVELOPMENT = 71_000_000
 LOOKED_AT = 2520
 """Cases whose answers were looked at: development ones, and the 300 of five earlier judgements each, from
 62 000 000, 67 000 000, 68 000 000, 69 000 000 and 70 000 000 on, the first 47 from 66 000 000 on, 136 from 65 000 000
-on and 152 from 63 000 000 on. Those from 64 000 000 on are left out: it is not known whether somebody looked at them."""
+on and 152 from 63 000 000 on. Those from 64 000 000 on are left out: whether somebody looked at them is not known."""
 
 NOISES = (0.5, 1.0, 2.0)
 MILD = ("clean", "coloured", "ringing", "cfc180", "1khz", "masses", "drifting")
