@@ -32,7 +32,7 @@ BETWEEN = 12.0**-0.5
 """Standard deviation, in samples, of an instant between two of them."""
 
 
-FARTHEST = 6.0
+FARTHEST = 2.0 * AS_WELL**0.5
 """Standard deviations that an onset may be off: twice as far as any that fits its signals as well."""
 
 
@@ -62,10 +62,13 @@ def onsets(recordings: Sequence[Recording], as_well: bool = False) -> tuple[Shif
     """Of the recordings whose signals begin elsewhere than at the stated time zero; as_well: or that may do so."""
     shifts = []
     for k, recording in enumerate(recordings):
-        onset = find_onset(recording)
-        if onset is not None and (onset.differs or (as_well and abs(onset.time_ns) > 1e9 * recording.sample_period)):
-            std = max(onset.precision_ns * 1e-9 / np.sqrt(AS_WELL), recording.sample_period * BETWEEN)
-            shifts.append(Shift(k, recording.test.id, onset.time_ns * 1e-9, float(std), recording.sample_period))
+        onset, period = find_onset(recording), recording.sample_period
+        if onset is None:
+            continue
+        seconds, precision = onset.time_ns * 1e-9, onset.precision_ns * 1e-9
+        if onset.differs or (as_well and abs(seconds) > period):
+            std = max(precision * AS_WELL**-0.5, period * BETWEEN)
+            shifts.append(Shift(k, recording.test.id, seconds, std, period))
     return tuple(shifts)
 
 
