@@ -142,7 +142,7 @@ def _from(structure: Structure, recordings: Sequence[Recording], shifts: Sequenc
 def _from_a_sharper_time_zero(
     structure: Structure, recordings: Sequence[Recording], effects: Mapping[str, Effect], found: SelectionPath,
     zero: TimeZero | None,
-) -> tuple[SelectionPath, TimeZero, tuple[Shift, ...]] | None:  # fmt: skip
+) -> tuple[SelectionPath, TimeZero | None, tuple[Shift, ...]] | None:  # fmt: skip
     """What is found from where the motion with the first effect that was found begins: where that leaves noise, as what
     was found does not, or does with more effects. Twice, as what came first may have been found for the time zero."""
     begins = onsets(recordings, as_well=True)
@@ -164,7 +164,9 @@ def _from_a_sharper_time_zero(
             return None
         path = first_believed(select(structure, observed(shifts), effects))
         if path.noise:
-            return (path, TimeZero(shifts, as_stated), ()) if len(path.added) <= most else None
+            elsewhere = tuple(shift for shift in shifts if abs(shift.seconds) > shift.period)
+            found_so = path, TimeZero(elsewhere, as_stated) if elsewhere else None, ()
+            return found_so if len(path.added) <= most else None
     return None
 
 

@@ -96,19 +96,20 @@ def time_zero_wrong(
 
 
 def sharpened(
-    onsets: Sequence[Shift], stated: Sequence[Shift], structure: Structure, additions: Sequence[Addition],
+    onsets: Sequence[Shift], taken: Sequence[Shift], structure: Structure, additions: Sequence[Addition],
     observed: Callable[[Sequence[Shift]], Sequence[ObservedRecord]],
 ) -> tuple[tuple[Shift, ...], float]:  # fmt: skip
-    """The likeliest shifts for the structure with some additions; and what they gain over those stated, in nats.
+    """The likeliest shifts for the structure with some additions; and what they gain over those `taken`, in nats.
 
     The logarithm of the likelihood is that of what is left from there on, in noise as large as that, and of the onsets,
     each with its standard deviation: free curves may begin before there is any force, and do not tell when.
 
     A pattern search to the sample (Hooke and Jeeves 1961), each recording's in turn and all together: from its onset,
-    or from what is stated of it, in steps that are halved, the first as long as its onset may be wrong by. The standard
-    deviations are those of a parabola through the samples next to it. observed(shifts) -> the records.
+    from what was taken for it, or from the stated time zero, in steps that are halved, the first as long as its onset
+    may be wrong by. The standard deviations are those of a parabola through the samples next to it. observed(shifts)
+    -> the records.
     """
-    bins = sum(record.bins * record.measured.shape[1] for record in observed(stated))
+    bins = sum(record.bins * record.measured.shape[1] for record in observed(taken))
 
     @cache
     def unlikely(shifts: tuple[Shift, ...]) -> float:
@@ -126,9 +127,10 @@ def sharpened(
         return tuple(one._replace(seconds=one.seconds + s) for one, s in zip(shifts, by, strict=True))
 
     each, together = [(k,) for k in range(len(onsets))], tuple(range(len(onsets)))
-    best = tuple(stated)
+    best = tuple(taken)
     for k, onset in enumerate(onsets):
-        best = min((best, (*best[:k], onset, *best[k + 1 :])), key=unlikely)
+        starts = best[k], onset, onset._replace(seconds=0.0)
+        best = min(((*best[:k], start, *best[k + 1 :]) for start in starts), key=unlikely)
     step = max(1, *(int(onset.std / onset.period) for onset in onsets))
     while step and not out_of_time():
         before = best
@@ -142,7 +144,7 @@ def sharpened(
         bent[i, j] = bent[j, i] = unlikely(moved(best, (i, j), 1)) - later[i] - later[j] + least
     stds = _stds(0.5 * bent, [onset.std / onset.period for onset in onsets])
     found = tuple(one._replace(std=one.period * max(BETWEEN, std)) for one, std in zip(best, stds, strict=True))
-    return found, 0.5 * (unlikely(tuple(stated)) - least)
+    return found, 0.5 * (unlikely(tuple(taken)) - least)
 
 
 def _stds(precision: np.ndarray, otherwise: Sequence[float]) -> Sequence[float]:
