@@ -18,7 +18,7 @@ from crash_replay.synthetic.recordings import simulate_recording
 def test_a_force_beside_a_spring_is_as_large_as_a_share_of_the_springs(name):
     recording, _ = simulate_recording("frontal_single")
     effect, model = EFFECTS[name], load_model("frontal_single")
-    shape = {key: value.starts[0] for key, value in effect.shapes.items()}
+    shape = {key: value.starts[0] for key, value in effect.shapes_of("").items()}
     element = model.elements[0].name
     structure = applied(add_effect(model, name, element, shape=shape), recording.test)
     (action,) = structure.actions

@@ -168,7 +168,8 @@ def _burg(values: np.ndarray, most: int) -> tuple[np.ndarray, list[np.ndarray]]:
 
 def _density(a, frequency: np.ndarray, period: float) -> np.ndarray:
     turn = np.exp(-2j * np.pi * period * np.outer(frequency, np.arange(1, len(a) + 1)))
-    return 1.0 / np.abs(1.0 + turn @ np.asarray(a, dtype=float)) ** 2
+    passed = np.abs(1.0 + turn @ np.asarray(a, dtype=float)) ** 2
+    return 1.0 / np.maximum(passed, np.finfo(float).eps ** 2)  # what does not decay at all is a root but for rounding
 
 
 def _slow_density(a, period: float) -> float:

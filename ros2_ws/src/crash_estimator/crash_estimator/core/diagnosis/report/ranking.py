@@ -94,9 +94,9 @@ def stated(term: Term, fitted: Fit) -> tuple[float, float, dict[str, float]]:
     gradient = [(value(at + s * e) - value(at - s * e)) / (2.0 * s) for s, e in each]
     if not np.isfinite(gradient).all():  # next to nothing, stated as one over it
         return value(at), np.inf, shapes
-    variance = float(np.array(gradient) @ covariance[np.ix_(parameters, parameters)] @ np.array(gradient))
-    with np.errstate(over="ignore"):  # of next to nothing, known to many powers of ten: inf
-        factor = np.expm1(np.sqrt(max(variance, 0.0)) / abs(value(at)))
+    with np.errstate(over="ignore", invalid="ignore"):  # of next to nothing, known to many powers of ten: inf
+        variance = float(np.array(gradient) @ covariance[np.ix_(parameters, parameters)] @ np.array(gradient))
+        factor = np.expm1(np.sqrt(max(variance, 0.0)) / abs(value(at))) if np.isfinite(variance) else np.inf
     return value(at), float(abs(value(at)) * factor), shapes
 
 

@@ -19,8 +19,9 @@ from crash_replay.onset import AS_WELL, find_onset
 from crash_replay.recording import Recording
 
 from ...effects.effect import Addition, Effect
-from ...structure import Structure
+from ...structure import ModelError, Structure
 from ..observation.record import ObservedRecord
+from ..output_error.normal_equations import may_diverge
 from ..parameterization.magnitudes import measure_magnitudes
 from ..parameterization.model_terms import additions_of
 from .assumptions import CELLS
@@ -30,7 +31,6 @@ from .time_limit import out_of_time
 
 BETWEEN = 12.0**-0.5
 """Standard deviation, in samples, of an instant between two of them."""
-
 
 FARTHEST = 2.0 * AS_WELL**0.5
 """Standard deviations that an onset may be off: twice as far as any that fits its signals as well."""
@@ -95,6 +95,7 @@ def time_zero_wrong(
     return zero if zero.gain(from_onset) > THRESHOLDS.gain else None
 
 
+@may_diverge
 def sharpened(
     onsets: Sequence[Shift], taken: Sequence[Shift], structure: Structure, additions: Sequence[Addition],
     observed: Callable[[Sequence[Shift]], Sequence[ObservedRecord]],
@@ -117,7 +118,10 @@ def sharpened(
         pairs = list(zip(shifts, onsets, strict=True))
         if any(abs(one.seconds - onset.seconds) > abs(onset.seconds) + FARTHEST * onset.std for one, onset in pairs):
             return np.inf
-        records = observed(shifts)
+        try:
+            records = observed(shifts)
+        except ModelError:  # too little is left from there on
+            return np.inf
         rms = fit_model(measure_magnitudes(structure, records, CELLS), records, additions).residuals.rms
         off = sum(((one.seconds - onset.seconds) / onset.std) ** 2 for one, onset in pairs)
         return 2.0 * bins * float(np.log(rms)) + off if np.isfinite(rms) else np.inf
