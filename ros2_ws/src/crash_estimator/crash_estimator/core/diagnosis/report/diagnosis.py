@@ -155,7 +155,7 @@ def _from_a_sharper_time_zero(
         return _from(structure, recordings, shifts)
 
     path = found
-    for _ in range(2 if most else 0):
+    for _ in range(2 if most > 0 else 0):
         if analyse(path.as_recorded).mean_square >= THRESHOLDS.real_structure or out_of_time():
             return None
         additions = (*path.final.additions[: path.present], *path.added[:1])
