@@ -65,8 +65,9 @@ def chapter_4(found: list[NoiseOrders], of_the_model: list[NoiseOrders], figures
         "passes the diagnosis's band test, which needs to know the sensor's noise.)", "",
         markdown_table(head, rows), "",
         "*Apart*: median over time of |difference of the two K/M| over its sigma; *within*: share of the time (from "
-        f"{SETTLED * 1e3:g} ms on) within two; of two normal variables of that sigma they would be 0.67 and 95 %. "
-        "*Error of K/M*: rms, 1/s^2, of about 600.", "",
+        f"{SETTLED * 1e3:g} ms on) within two; of two normal variables of that sigma they would be 0.67 and 95 %. Here "
+        "they are closer: both sigmas count errors of the motion, which are the same in both. *Error of K/M*: rms, "
+        "1/s^2, of about 600.", "",
         "As in the thesis, the residual of 0,0 is auto-correlated and both orders find the same K/M within their "
         "sigmas, because the residual does not go along with the inputs.", "",
         "Which noise: in 4.5.1 the thesis adds a sine and white noise to the simulated acceleration, by its words, "
