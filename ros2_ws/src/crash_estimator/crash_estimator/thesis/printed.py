@@ -131,10 +131,10 @@ def section(data: Path | None) -> list[str]:
         "of `afmm` (`interval`) cost force; they are for measured vibration, which would pass for jumps. `offsets` "
         "are for sensors whose zero is known from few samples, and change little here. MRLS is lost without "
         "`take_back` where a repetition overshoots, and as printed on the dummy too, where theta_lmt on every step "
-        "holds it back. Bounds (`constrained`) are for the dummy, whose contacts open. `noise_floor` and `forget_excited` "
-        "change next to nothing on these; they keep Lambda and R invertible where equations are few or an element "
-        "is apart for long. Gauss-Newton as printed may find an unstable noise model (`largest_root`), or one that "
-        "follows the misfit (`noise_memory`, `known_to`).", "",
+        "holds it back. Bounds (`constrained`) are for the dummy, whose contacts open. `noise_floor` and "
+        "`forget_excited` change next to nothing on these; they keep Lambda and R invertible where equations are few "
+        "or an element is apart for long. Gauss-Newton as printed may find an unstable noise model (`largest_root`), "
+        "or one that follows the misfit (`noise_memory`, `known_to`).", "",
         "R1 as printed is a constant whose size the thesis does not give: `process_noise` 3 is ours, of 1, 3, 10 "
         "and 30 the best on the simulated recordings. The recursions are those of 5.3, 5.5.1, 6.3, 6.4.2 and 4.10; "
         "`tests/core/test_printed_recursions.py` has each transcribed. The thesis gives no recursion for AFMM, "
