@@ -86,8 +86,8 @@ def test_a_maxwell_element_is_a_damper_where_it_relaxes_at_once_and_a_spring_whe
     assert_allclose(maxwell(time, crush, relaxation_time=1e6)[0], crush, atol=1e-7)
 
 
-def cushion(time, crush, start=0.0, length=0.2, leak=0.0):
-    return EFFECTS["gas_cushion"].memory(time, crush, start, length=length, leak=leak)
+def cushion(time, crush, start=0.0, length=0.2, leak=0.0, form=""):
+    return EFFECTS["gas_cushion"].memory(time, crush, start, length=length, leak=leak, form=form)
 
 
 def test_a_tight_gas_cushion_is_an_adiabatic_spring_and_one_with_a_hole_loses_what_its_equation_says():
@@ -95,6 +95,8 @@ def test_a_tight_gas_cushion_is_an_adiabatic_spring_and_one_with_a_hole_loses_wh
     crush = 0.12 * np.sin(np.pi * time / 0.05)
     adiabatic = (1.0 - crush / 0.2) ** -1.4 - 1.0
     assert_allclose(cushion(time, crush)[0], adiabatic, atol=1e-9)
+    boyle = 1.0 / (1.0 - crush / 0.2) - 1.0  # p V stays where the gas stays as warm as it is
+    assert_allclose(cushion(time, crush, form="isothermal")[0], boyle, atol=1e-9)
 
     def left(t, m):
         over = max((m[0] / (1.0 - 0.6 * np.sin(np.pi * t / 0.05))) ** 1.4 - 1.0, 0.0)

@@ -1,12 +1,13 @@
 """A cushion of gas with a hole (airbag, bladder, tyre): F = c y, with y the overpressure over that of the air outside.
 
-    y = (m / (1 - X / L))^1.4 - 1 >= 0,      dm/dt = - w sqrt(y),      m = 1 at first contact
+    y = (m / (1 - X / L))^n - 1 >= 0,      dm/dt = - w sqrt(y),      m = 1 at first contact
 
 X is the crush in m, compression positive; c in N, never negative, is the pressure outside times the cushion's area; its
 length L in m, which no crush reaches, and w in 1/s, at which its gas would leave at twice the pressure outside, are
-found. m is the share of the gas that is left; as the cushion opens, what is missing flows in freely. The gas is
-compressed without heat, and leaves as water would (Bernoulli, which holds below a third of the speed of sound). It is a
-nonlinear spring where w is small, a damper of the square of the rate where it is large.
+found. m is the share of the gas that is left; as the cushion opens, what is missing flows in freely. The gas keeps its
+heat (n = 1.4, of air) or, in the form `isothermal`, gives it to the walls (n = 1); it leaves as water would (Bernoulli,
+which holds below a third of the speed of sound). It is a nonlinear spring where w is small, a damper of the square of
+the rate where it is large.
 """
 
 import numpy as np
@@ -14,13 +15,16 @@ import numpy as np
 from .effect import Shape
 from .kinds import RememberingForce
 
+EXPONENTS = {"": 1.4, "isothermal": 1.0}
+"""Form -> polytropic exponent n: the ratio of the specific heats of air, and where the gas stays as warm as it is."""
+
 
 def memory(time: np.ndarray, crush: np.ndarray, start: float, length: float, leak: float, form: str = ""):
     """y (g,) from `start` at the first of the crushes (g,) m, and how it follows: see `RememberingForce`."""
     from .vented_gas import trace  # the compiler takes long to import: only who needs it waits for it
 
     step, crush = np.diff(time, prepend=time[0]), np.ascontiguousarray(crush, dtype=float)
-    return trace(step, crush, float(start), float(length), float(leak))
+    return trace(step, crush, float(start), float(length), float(leak), EXPONENTS[form])
 
 
 EFFECT = RememberingForce(
@@ -31,6 +35,7 @@ EFFECT = RememberingForce(
         "leak": Shape("1/s", 5.0, 300.0, (10.0, 50.0)),
     },
     memory=memory,
+    ways=("isothermal",),
     bounded=False,
     rare=True,
 )

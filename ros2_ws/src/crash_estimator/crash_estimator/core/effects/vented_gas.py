@@ -5,9 +5,6 @@ from numba import njit
 
 from .. import compile_cache as _compile_cache  # noqa: F401  before any compiled function is defined
 
-KAPPA = 1.4
-"""Ratio of the specific heats of air."""
-
 LEAST = 0.02
 """Share of its length that a cushion keeps: no crush is to make its force infinite."""
 
@@ -30,40 +27,41 @@ def _flow(y, leak):
 
 
 @njit(cache=True)
-def _pressed(gas, room):
+def _pressed(gas, room, exponent):
     """The overpressure y of gas in a room, and its derivative by gas / room."""
     dense = max(gas, 0.0) / room
-    y = dense**KAPPA - 1.0
-    return (y, KAPPA * (y + 1.0) / dense) if y > 0.0 else (0.0, 0.0)
+    y = dense**exponent - 1.0
+    return (y, exponent * (y + 1.0) / dense) if y > 0.0 else (0.0, 0.0)
 
 
 @njit(cache=True)
-def _advanced(y, before, now, step, length, leak):
+def _advanced(y, before, now, step, length, leak, exponent):
     """y after a step from one crush to another, by the midpoint rule, and its derivatives by y, `now` and `before`."""
     (first, by_before), (last, by_now) = _room(before, length), _room(now, length)
-    dense = (1.0 + y) ** (1.0 / KAPPA)
-    gas, gas_by_y = first * dense, first * dense / (KAPPA * (1.0 + y))
+    dense = (1.0 + y) ** (1.0 / exponent)
+    gas, gas_by_y = first * dense, first * dense / (exponent * (1.0 + y))
     flow, flow_by_y = _flow(y, leak)
     half, half_by_y = gas - 0.5 * step * flow, gas_by_y - 0.5 * step * flow_by_y
     between = 0.5 * (first + last)
-    middle, steep = _pressed(half, between)
+    middle, steep = _pressed(half, between, exponent)
     flow, slope = _flow(middle, leak)
     slope *= step * steep / between  # of what leaves, by the gas half-way
     narrower = 0.5 * slope * half / between
     gas, gas_by_y = gas - step * flow, gas_by_y - slope * half_by_y
-    y, steep = _pressed(gas, last)
+    y, steep = _pressed(gas, last, exponent)
     steep /= last
     by_first, by_last = steep * (dense - slope * dense + narrower), steep * (narrower - gas / last)
     return y, steep * gas_by_y, by_last * by_now, by_first * by_before
 
 
 @njit(cache=True)
-def trace(step, crush, start, length, leak):
+def trace(step, crush, start, length, leak, exponent):
     """y (g,), dy_t/dy_{t-1}, dy_t/dX_t and - dy_t/dX_{t-1}."""
     g = len(crush)
     y, by_y, by_crush, by_before = np.empty(g), np.ones(g), np.zeros(g), np.zeros(g)
     y[0] = start
     for t in range(1, g):
-        y[t], by_y[t], by_crush[t], before = _advanced(y[t - 1], crush[t - 1], crush[t], step[t], length, leak)
+        between = crush[t - 1], crush[t]
+        y[t], by_y[t], by_crush[t], before = _advanced(y[t - 1], *between, step[t], length, leak, exponent)
         by_before[t] = -before
     return y, by_y, by_crush, by_before
