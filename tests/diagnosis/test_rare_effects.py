@@ -9,9 +9,10 @@ import pytest
 from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.core.diagnosis.selection import rare_effects, selection_step
 from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
-from crash_estimator.core.diagnosis.selection.rare_effects import common_effects, with_rare_ones
+from crash_estimator.core.diagnosis.selection.rare_effects import common_effects, found_as_common, with_rare_ones
 from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
 from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.effects.effect import Addition
 from crash_estimator.core.structure import EffectSpec
 from crash_estimator.model_file import ModelFile
 from crash_replay.synthetic.hidden.cases import draw_case
@@ -60,6 +61,11 @@ def fitted(name: str, cost: float) -> CandidateFit:
     return CandidateFit(addition, 1e5 - cost, SimpleNamespace(cost=cost))
 
 
+def left(fit) -> SimpleNamespace:
+    """Of 1000 samples: noise up to a mean square of 1.1."""
+    return SimpleNamespace(white=fit.cost < 1.1e3, mean_square=fit.cost / 1e3)
+
+
 @pytest.mark.parametrize(
     ("left_by_common", "left_by_rare", "asked", "leads"),
     [
@@ -68,9 +74,11 @@ def fitted(name: str, cost: float) -> CandidateFit:
         (1e3, 1e3 + 50.0, [False], "friction"),
         (1e4, 9e3, [False, True], "friction"),  # less than the common one, but no noise: tried with care
         (1e4, 2e4, [False], "friction"),
+        (1e4, 1.2e3, [False, True], "gas_cushion"),  # less than the noise again is left, of hundred times as much
+        (1.9e3, 1.2e3, [False, True], "friction"),  # a common one comes as near
     ],
 )
-def test_a_rare_effect_comes_into_the_ranking_where_it_leaves_noise(
+def test_a_rare_effect_comes_into_the_ranking_where_it_leaves_noise_or_next_to_nothing_else(
     monkeypatch, left_by_common, left_by_rare, asked, leads
 ):
     tried = []
@@ -81,13 +89,15 @@ def test_a_rare_effect_comes_into_the_ranking_where_it_leaves_noise(
         return [fitted("gas_cushion", cost=left_by_rare)]
 
     monkeypatch.setattr(rare_effects, "fit_candidates", fit_candidates)
-    monkeypatch.setattr(selection_step, "analyse", lambda fit: SimpleNamespace(white=fit.cost < 2e3))
-    model = SimpleNamespace(white=False, fit=SimpleNamespace(cost=1e5), records=[SimpleNamespace(below=np.inf)])
+    for module in (selection_step, rare_effects):
+        monkeypatch.setattr(module, "analyse", left)
+    fit = SimpleNamespace(cost=1e5)
+    model = SimpleNamespace(white=False, fit=fit, residuals=left(fit), records=[SimpleNamespace(below=np.inf)])
     step = SelectionStep(model, [fitted("friction", cost=left_by_common)])
     magnitudes = SimpleNamespace(structure=SimpleNamespace(effects=()))
     found = with_rare_ones(magnitudes, EFFECTS, step)
     assert tried == asked and found.best.addition.key[0] == leads
-    assert (found is step) == (left_by_rare >= 2e3)  # what leaves more than noise is not even told
+    assert (found is step) == (leads == "friction" and left_by_rare >= 1.1e3)  # what is not believed is not told
     model.records[0].below = 240.0  # in a band alone anything leaves noise
     assert with_rare_ones(magnitudes, EFFECTS, step) is step
 
@@ -101,3 +111,16 @@ def test_what_the_model_has_is_common_in_all_its_forms():
     found = common_effects(replace(model, effects=specs), EFFECTS)
     assert EFFECTS.keys() - found.keys() == {"gas_cushion"}
     assert found["rate_hardening"].variants == ("", "logarithmic")
+
+
+def test_what_was_found_in_the_whole_band_is_common_in_a_part_of_it():
+    model, *_ = case("impactor", "viscous_damping")
+    target = model.elements[0].name
+    rate = EFFECTS["rate_hardening"]
+    logarithmic = Addition(rate, target, variant="logarithmic")
+    effects = found_as_common(EFFECTS, [logarithmic, Addition(EFFECTS["viscous_damping"], target)])
+    assert common_effects(model, effects)["rate_hardening"].variants == ("logarithmic",)
+    assert set(effects["rate_hardening"].variants) == set(rate.variants)
+    cushion = Addition(EFFECTS["gas_cushion"], target, variant="isothermal")
+    assert "gas_cushion" in common_effects(model, found_as_common(EFFECTS, [cushion]))
+    assert "gas_cushion" not in common_effects(model, EFFECTS)

@@ -56,7 +56,7 @@ def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypa
         "first_step": lambda *given: None,
         "forward_selection": lambda *given: begun.append(given) or ([step(given[2])], given[2]),
         "measure_magnitudes": lambda *given: SimpleNamespace(cells=72),
-        "fit_model": lambda *given: model(1.5),
+        "fit_given": lambda *given: model(1.5),
         "drift_of": lambda fit: SimpleNamespace(constant=True),
         "analyse": lambda fit: None,
         "_wants_finer_curves": lambda *given: wanted,

@@ -119,6 +119,11 @@ class Effect:
             return None if self.rare else self
         return replace(self, forms=dict(list(self.forms.items())[:1]))
 
+    def as_common(self, variant: str) -> "Effect":
+        """The same, with what acts in this variant looked for first."""
+        forms = {variant: self.forms[variant]} | dict(self.forms) if self.forms else self.forms
+        return replace(self, rare=False, forms=forms)
+
     def put_to_work(self, structure: Structure, test: Test, spec: EffectSpec) -> Structure:
         """The structure as estimators and free runs take it: with this effect in its elements, masses or actions.
 

@@ -169,8 +169,9 @@ def fit(
     layout = problem.layout
     stages = list(schedule or (() if start else FROM_MEASURED_MOTION))
     most += max(len(stages) - len(FROM_MEASURED_MOTION), 0)
-    point = start or equation_error_start(problem, held)
-    shapes, stays = shape_parameters(layout), np.isin(np.arange(layout.size), held)
+    point = start or equation_error_start(problem, (*held, *layout.trusted))
+    shapes = shape_parameters(layout)
+    stays, trusted = (np.isin(np.arange(layout.size), which) for which in (held, layout.trusted))
     last_good: tuple[Point, Step] | None = None
     least: tuple[Point, Step, Normal] | None = None
     halvings, last, iteration, circles = 0, np.inf, 0, 0
@@ -181,6 +182,7 @@ def fit(
             normal, equations = normal_equations(problem, point, stage)
             # a shape constant fitted to a motion that is still wrong goes astray
             fixed = stays | shapes if stage.inflate > 1.0 else stays
+            fixed = fixed | trusted if stage.observer > 0.0 else fixed
             step = solve(layout, normal, point.theta, stage.inflate, fixed)
         except LinAlgError:
             step = None

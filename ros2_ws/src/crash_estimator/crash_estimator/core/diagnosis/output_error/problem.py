@@ -40,9 +40,27 @@ class OutputErrorProblem(NamedTuple):
         """The same parameters on other records of the same tests, as with other noise."""
         return OutputErrorProblem(self.layout, experiments_of(self.layout, records))
 
-    def starting_at(self, start: np.ndarray) -> "OutputErrorProblem":
-        """The same with other starting values (p,)."""
-        return self._replace(layout=self.layout._replace(start=start)).on(self.records)
+    def starting_at(self, start: np.ndarray, trusted: Sequence[int] = ()) -> "OutputErrorProblem":
+        """The same with other starting values (p,).
+
+        trusted: of parameters that the measured motion would mislead. The crush of a stiff element between two bodies
+        is a small difference of two motions, each with errors of its own: along it the stiffness comes out too low, and
+        a simulation that swings too slowly is drawn no nearer.
+        """
+        layout = self.layout._replace(start=start, trusted=(*self.layout.trusted, *trusted))
+        return self._replace(layout=layout).on(self.records)
+
+    def starting_as_stated(self) -> "OutputErrorProblem":
+        """The same with constant stiffnesses that start as the model file says."""
+        stated, start = self.layout.stated, self.layout.start.copy()
+        start[list(stated)] = list(stated.values())
+        return self.starting_at(start, list(stated))
+
+    def starting_as_found(self, narrow: Layout, theta: np.ndarray) -> "OutputErrorProblem":
+        """The same with constant stiffnesses that start as they were found with fewer effects."""
+        stiff, start = list(self.layout.stated), self.layout.start.copy()
+        start[stiff] = self.widened(narrow, theta)[stiff]
+        return self.starting_at(start, stiff)
 
     def measured(self, theta: np.ndarray) -> Point:
         """Parameters, and the motions that the sensors show if they err as these say."""

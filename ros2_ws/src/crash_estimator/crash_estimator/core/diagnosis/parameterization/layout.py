@@ -60,6 +60,13 @@ class Layout(NamedTuple):
     prior: Prior
     start: np.ndarray  # (p,)
     names: tuple[str, ...]  # of the common parameters after the knots
+    trusted: tuple[int, ...] = ()  # they stay as they start while a fit is held to the measured motion
+
+    @property
+    def stated(self) -> dict[int, float]:
+        """Constant stiffnesses -> what the model file says of them, N/m."""
+        links = (link for link in self.links if link.constant is not None)
+        return {link.constant: link.known_stiffness for link in links if link.known_stiffness > 0.0}
 
     def term(self, addition: Addition) -> Term:
         """That of an addition with the same effect and target: a model has no effect twice on one target."""

@@ -22,9 +22,10 @@ from ..residuals.score_test import drift_of
 from ..residuals.vibration import vibrates_from
 from .acceptance import share_removed
 from .contacts import all_when_spent, elastic_when_spent, moves_otherwise, never_pulling
-from .fitted_model import Model, fit_model
+from .fitted_model import Model, fit_given, fit_model
 from .forward_selection import first_step, forward_selection
 from .pruning import up_to_the_least_error
+from .rare_effects import found_as_common
 from .selection_step import SelectionStep, as_found
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
@@ -72,7 +73,8 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
     vibration = vibrates_from(left, records)
     if vibration == np.inf or left.mean_square >= THRESHOLDS.near_floor:
         return path
-    return _selected(structure, [record.in_band(vibration) for record in records], effects)
+    below = [record.in_band(vibration) for record in records]
+    return _selected(structure, below, found_as_common(effects, path.added))
 
 
 def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
@@ -98,9 +100,14 @@ def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: 
         otherwise = _as_exact_as_needed(best(path.structure), path.records, effects, path.added)
         tried.append(otherwise.structure)
         path = max(path, otherwise, key=SelectionPath.rank)
-    if path.final.white or structure in tried or out_of_time():
+    if path.final.white or structure in tried or explains_most(path) or out_of_time():
         return path
     return max(path, _as_exact_as_needed(structure, records, effects), key=SelectionPath.rank)
+
+
+def explains_most(path: SelectionPath) -> bool:
+    """What was found takes a large share of the misfit away."""
+    return share_removed(path.steps[0].before.residuals, path.final.residuals) > THRESHOLDS.named_share
 
 
 def first_believed(path: SelectionPath) -> SelectionPath:
@@ -190,7 +197,7 @@ def _as_given(
     structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]
 ) -> tuple[Magnitudes, Model]:
     magnitudes = measure_magnitudes(structure, records, CELLS)
-    return magnitudes, fit_model(magnitudes, records, additions_of(structure, magnitudes, effects))
+    return magnitudes, fit_given(magnitudes, records, additions_of(structure, magnitudes, effects))
 
 
 def _in_doubt(doubted: Magnitudes, model: Model) -> Model:
@@ -225,7 +232,7 @@ def _with_curves_as_fine_as_needed(
     mimicked = final.white and not drift_of(as_recorded).constant
     if not out_of_time() and _wants_finer_curves(final, mimicked, analyse(as_recorded), finer, len(present)):
         found = final.additions[len(present) :]
-        finer_given = fit_model(finer, records, present)
+        finer_given = fit_given(finer, records, present)
         finer_first = first_step(finer, effects, finer_given, found)
         finer_steps, finer_final = forward_selection(finer, effects, finer_given, finer_first)
         fewer = len(finer_final.additions) < len(final.additions) or not final.white
@@ -254,8 +261,7 @@ def _wants_finer_curves(final: Model, mimicked: bool, residuals: Residuals, fine
         return drift_of(refined(final.additions).fit).constant
     if final.white or residuals.mean_square >= THRESHOLDS.near_floor:
         return False
-    sharper = refined(final.additions)
-    return sharper.white or share_removed(residuals, sharper.residuals) > THRESHOLDS.least_share
+    return refined(final.additions).white
 
 
 def in_the_sensors_noise(model: Model, records: Sequence[ObservedRecord]) -> Fit:

@@ -10,7 +10,6 @@ from ...effects.effect import Addition, Effect
 from ..output_error.continuation import (
     FROM_MEASURED_MOTION,
     FROM_SIMULATION,
-    LARGE_NOISE,
     SLOW_CONTACT,
     SMALL_STEPS,
     Schedule,
@@ -80,8 +79,6 @@ def fit_candidates(
             lambda: search.from_motion(shortlist(worth, short) + shortlist(by_motion, long)),
             search.profile,
             lambda: search.from_motion([one for a in gridded for one in grid_starts(magnitudes, model, a)]),
-            search.slowly,
-            lambda: search.anew(LARGE_NOISE),
         )
         for harder in (*with_care, *more_of_them):
             if out_of_time():
@@ -143,18 +140,14 @@ class _Search:
             self._fit(replace(best, taken_from=None))
 
     def profile(self) -> None:
-        """Fit the likeliest of the constants that say when a force ends, over them."""
-        profiled: dict[tuple[str, str], list[Addition]] = {}
-        for one in self.screened:
-            if one.addition.effect.profiled:
-                profiled.setdefault(one.addition.key, []).append(one.addition)
-        looks = [
-            profile(self._problem(starts[0]), starts[0], [addition.coefficient for addition in starts])
-            for starts in list(profiled.values())[: THRESHOLDS.most_profiles]
-        ]
-        best = min(looks, key=lambda look: look.fit.cost, default=None)
-        if best and best.fit.cost < self.model.fit.cost:
-            self._note(best.addition, closer(best))
+        """Fit the likeliest that has a constant which says when its force ends, over that."""
+        likeliest = next((one for one in self.ranking() if one.addition.effect.profiled), None)
+        if likeliest is None:
+            return
+        starts = [one.addition for one in self.screened if one.addition.key == likeliest.addition.key]
+        look = profile(self._problem(starts[0]), starts[0], [addition.coefficient for addition in starts])
+        if look.fit.cost < self.model.fit.cost:
+            self._note(look.addition, closer(look))
 
     def slowly(self) -> None:
         """Fit the best ones on, with care for forces that jump."""
@@ -203,7 +196,8 @@ class _Search:
 
     def _problem(self, addition: Addition) -> OutputErrorProblem:
         model = self.model
-        return make_problem(self.magnitudes, model.records, [*model.additions, addition], model.roughness)
+        problem = make_problem(self.magnitudes, model.records, [*model.additions, addition], model.roughness)
+        return problem.starting_as_found(model.fit.layout, model.fit.theta)
 
     def reached_the_floor(self) -> bool:
         """The best so far leaves nothing but noise."""

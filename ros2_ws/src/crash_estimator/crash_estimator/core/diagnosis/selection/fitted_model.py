@@ -1,6 +1,7 @@
 """A structure with some additions, fitted to recordings."""
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -40,11 +41,10 @@ class Model(NamedTuple):
         found = fit(self.fit.problem, start, schedule, hopeless)
         return self._replace(fit=found, residuals=analyse(found, sharply=True))
 
-    def best_of(self, schedules: Sequence[Schedule]) -> "Model":
-        """The best of this fit and those from the measured motion by other schedules."""
+    def best_of(self, schedules: Sequence[Schedule], *others: "Model") -> "Model":
+        """The best of this fit, others of the same model, and those from the measured motion by other schedules."""
         best = self
-        for schedule in schedules:
-            other = self.refitted(schedule=schedule)
+        for other in chain(others, (self.refitted(schedule=schedule) for schedule in schedules)):
             best = other if better(other, best) else best
         return best
 
@@ -66,6 +66,16 @@ def fit_model(
     if not problem.noise_is_inflated:
         found, residuals = _with_more_care(problem, found, residuals)
     return Model(tuple(additions), found, residuals, roughness)
+
+
+def fit_given(magnitudes: Magnitudes, records: Sequence[ObservedRecord], additions: Sequence[Addition]) -> Model:
+    """The best of several fits, where not all is noise: of a fit that has stopped elsewhere than at the least, every
+    effect would seem to explain much."""
+    model = fit_model(magnitudes, records, additions)
+    if model.white:
+        return model
+    as_stated = fit(model.fit.problem.starting_as_stated())
+    return model.best_of((SMALL_STEPS, LARGE_NOISE), model.refitted(as_stated.point))
 
 
 def _with_more_care(problem: OutputErrorProblem, found: Fit, residuals: Residuals) -> tuple[Fit, Residuals]:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from ...effects.effect import Addition, Effect
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
-from .acceptance import better, explains_too_little, needed_gain
+from .acceptance import better, explains_too_little, needed_gain, share_removed
 from .candidate_fits import CandidateFit
 from .fitted_model import Model
 from .pair_search import Pair, as_expected, near_the_floor, two_at_once, two_of_one_effect
@@ -41,7 +41,8 @@ def forward_selection(
     if pair:
         return _one_by_one(pair.magnitudes, effects, pair.model, pair.path, present)
     path, final = _one_by_one(magnitudes, effects, given, [], present, step)
-    if final.white or out_of_time():
+    next_to_nothing = share_removed(given.residuals, final.residuals) > THRESHOLDS.all_but_folds
+    if final.white or next_to_nothing or out_of_time():
         return path, final
     pair = two_at_once(magnitudes, common, given, path[0].as_recorded, alike)
     if pair is None:

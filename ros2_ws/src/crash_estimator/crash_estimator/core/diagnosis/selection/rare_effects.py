@@ -1,15 +1,19 @@
 """Rare effects bend far, and one of them with another beside it would follow most that no vocabulary has: they are
-asked after the common ones, in a first step only, and believed only where one of them alone leaves noise."""
+asked after the common ones, in a first step only, and believed only where one of them alone leaves noise, or next to
+nothing else where no common one leaves noise."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from ...effects.effect import Addition, Effect
 from ...structure import Structure
 from ..parameterization.magnitudes import Magnitudes
+from ..residuals.residuals import analyse
+from .acceptance import share_removed
 from .candidate_fits import CandidateFit, fit_candidates
 from .selection_step import SelectionStep
+from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
 
 
@@ -20,6 +24,11 @@ def common_effects(structure: Structure, effects: Mapping[str, Effect]) -> Mappi
     return {name: effect for name, effect in found.items() if effect}
 
 
+def found_as_common(effects: Mapping[str, Effect], found: Iterable[Addition]) -> Mapping[str, Effect]:
+    """The effects, with rare ones that were found looked for among the first."""
+    return {**effects} | {one.effect.name: one.effect.as_common(one.variant) for one in found if is_rare(one)}
+
+
 def is_rare(addition: Addition) -> bool:
     """Whether it is of an effect, or of a form of one, that is looked for last."""
     common = addition.effect.common()
@@ -27,7 +36,7 @@ def is_rare(addition: Addition) -> bool:
 
 
 def with_rare_ones(magnitudes: Magnitudes, effects: Mapping[str, Effect], step: SelectionStep) -> SelectionStep:
-    """A first step of common effects, with the rare ones in its ranking where one of them leaves noise, alone.
+    """A first step of common effects, with the rare ones in its ranking where one of them is believed.
 
     They are fitted with care where the common ones leave more than noise, and one of them less than the best of those.
     """
@@ -42,13 +51,23 @@ def with_rare_ones(magnitudes: Magnitudes, effects: Mapping[str, Effect], step: 
     leaves_less = any(one.fit and one.fit.cost < least for one in alone.candidates)
     if leaves_less and not (step.leaves_noise or alone.leaves_noise):
         alone = SelectionStep(model, fit_candidates(magnitudes, rare, model, thorough=True, least=least))
-    if not alone.leaves_noise:
+    if not (alone.leaves_noise or (_leaves_next_to_nothing(alone) and not _near_the_floor(step))):
         return step
     best: dict[tuple[str, str], CandidateFit] = {}
     for one in sorted([*step.candidates, *alone.candidates], key=_rank):
         best.setdefault(one.addition.key, one)
     together = list(best.values())
     return SelectionStep(model, together, together)
+
+
+def _leaves_next_to_nothing(step: SelectionStep) -> bool:
+    """The best leaves less than the noise again, of much more: the rest may be the form of its law."""
+    near = _near_the_floor(step)
+    return near and share_removed(step.before.residuals, analyse(step.best.fit)) > THRESHOLDS.all_but_folds
+
+
+def _near_the_floor(step: SelectionStep) -> bool:
+    return bool(step.best and analyse(step.best.fit).mean_square < THRESHOLDS.near_floor)
 
 
 def _rank(one: CandidateFit) -> tuple[bool, float]:

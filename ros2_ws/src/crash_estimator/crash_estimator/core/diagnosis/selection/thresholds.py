@@ -69,8 +69,6 @@ class Thresholds(NamedTuple):
     tried on beside the one where it explains most."""
     with_care: int = 3
     """Candidates that are then fitted on by other schedules, and that are tried with a second one at once."""
-    most_profiles: int = 4
-    """Slopes on which an element may unload that are looked at over their value."""
     offset_starts: int = 2
     """Values of an offset that fits start from: those with which the forces along the measured motion fit best."""
     inflations: int = 3
