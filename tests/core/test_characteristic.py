@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers_estimation import ESTIMATED, oscillator, oscillator_recording
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.core.characteristic import characteristics
 from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.core.structure import Coefficient
+from crash_replay.recording import Recording
 
 
 @pytest.mark.parametrize("tension", [True, False])
@@ -29,3 +30,12 @@ def test_a_constant_stiffness_is_a_line_over_the_crush_it_was_found_on(tension):
     assert_allclose(found.force, [-stiffness * reach if tension else 0.0, 0.0, stiffness * reach])
     if tension:
         assert_allclose([stiffness, found.damping], [2.0e4, 50.0], rtol=0.05)
+
+
+def test_an_element_that_was_never_crushed_has_no_force_over_a_meter():
+    moving = oscillator_recording(n=30)
+    recording = Recording(moving.test, moving.time_ns, np.zeros_like(moving.values))
+    estimator = make_estimator(oscillator(), recording.test, "kalman", compiled=False)
+    (found,) = characteristics(oscillator(), estimator.description, run(estimator, recording.samples()))
+    assert_array_equal(found.crush, [0.0, 1.0])
+    assert_array_equal(found.force, [0.0, 0.0])

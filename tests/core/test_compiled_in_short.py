@@ -1,12 +1,16 @@
 """The compiled recursion against the readable one on a few samples: quick also where nothing is compiled."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers_estimation import plain
 from numpy.testing import assert_allclose
 from test_compiled import ARRAYS
 
+from crash_estimator.core.compiled.follow import _report
+from crash_estimator.core.estimate import ElementState, ParameterStatus
 from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.model_file import load_model
@@ -71,3 +75,24 @@ def test_so_they_do_by_the_preset_of_the_thesis(method):
     assert_forms_agree(
         load_model("frontal_engine_cab"), sparse("frontal_engine_cab"), method, preset="thesis", **METHODS[method]
     )
+
+
+@pytest.mark.parametrize("unloading", [0.0, 4e5])
+@pytest.mark.parametrize("state", ElementState)
+def test_only_the_stiffness_of_an_element_on_its_unloading_line_is_held_by_that(state, unloading):
+    """Of one element, its stiffness and its damping estimated; what is apart carries nothing at all."""
+    two, none, square = np.zeros(2), np.zeros(0), np.eye(2)
+    plan = SimpleNamespace(
+        element=np.zeros(2, int), slot=np.arange(2), is_stiffness=np.array([1, 0]), unloading=np.array([unloading])
+    )
+    row = SimpleNamespace(
+        state=np.array([float(state)]), parameters=two.copy(), std=two.copy(), status=two.copy(), force=np.zeros(1),
+        force_std=np.zeros(1), covariance=square.copy(),
+    )  # fmt: skip
+    room = SimpleNamespace(
+        per_unit=np.ones(2), shift=np.zeros(1), known=none, gradient=np.zeros((0, 2)), before=two, clamped=two
+    )
+    plain(_report)(plan, SimpleNamespace(estimated=2), SimpleNamespace(theta=np.ones(2), stated=square), row, room)
+    usual = ParameterStatus.APART if state == ElementState.APART else ParameterStatus.ESTIMATED
+    held = state == ElementState.UNLOADING and unloading > 0.0
+    assert list(row.status) == [ParameterStatus.UNLOADING if held else usual, usual]

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from helpers_estimation import plain
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.core.compiled.layout import ROW, STATE, shapes
 from crash_estimator.core.compiled.linear import invert
-from crash_estimator.core.compiled.plan import flat, make_method_plan
+from crash_estimator.core.compiled.plan import MethodPlan, flat, make_method_plan
 from crash_estimator.core.compiled.views import method_of, plan_views, row_views, size_of, state_views
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.model_file import load_model
@@ -40,6 +41,11 @@ def test_a_plan_comes_back_from_its_two_arrays(method):
     plan = plan_views(whole[len(estimator.size) :], others[len(settings) :], estimator.size)
     for name, found, given in zip(estimator.plan._fields, plan, estimator.plan, strict=True):
         assert_array_equal(found, given, err_msg=name)
+
+
+def test_each_setting_of_a_method_comes_back_in_its_place():
+    settings = MethodPlan(True, False, *np.arange(2.5, 8.0), 3, 8.5)
+    assert plain(method_of)(np.array(settings, dtype=float)) == settings
 
 
 def test_the_kept_part_of_a_matrix_is_inverted_and_a_singular_one_gives_no_number():

@@ -68,6 +68,13 @@ def test_forces_have_the_sizes_of_their_equations():
     assert_allclose(EFFECTS["bottoming_out"].force(motion([0.1, 0.2], [1.0, 1.0]), stop=0.15), [0.0, 0.05], atol=1e-15)
 
 
+def test_hysteresis_that_stands_still_is_as_it_was_and_follows_what_was_before():
+    z, by_before, by_crush, _ = EFFECTS["hysteresis"].memory(np.zeros(3), np.full(3, 0.01), 0.3, 0.02, 2.0)
+    assert_array_equal(z, 0.3)
+    assert_array_equal(by_before, 1.0)
+    assert_allclose(by_crush[1:], (1.0 - 0.3**2) / 0.02)
+
+
 def test_the_rate_of_cowper_and_symonds_doubles_the_force():
     hardening = EFFECTS["rate_hardening"]
     c = hardening.unstated(40.0, exponent=5.0)

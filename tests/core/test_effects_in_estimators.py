@@ -17,7 +17,7 @@ from crash_estimator.core.estimate import Estimate, ParameterStatus
 from crash_estimator.core.fold import run
 from crash_estimator.core.free_run import free_run
 from crash_estimator.core.methods import make_estimator
-from crash_estimator.core.structure import Coefficient, EffectSpec, ModelError
+from crash_estimator.core.structure import Body, Coefficient, EffectSpec, ModelError
 from crash_replay.recording import Recording
 
 IN_DUMMY = ("viscous_damping", "quadratic_damping", "coulomb_friction", "load_path")
@@ -215,6 +215,18 @@ def test_where_there_is_no_compiled_form_the_readable_one_is_taken(effect):
     _, what, recording, _ = hidden(effect, "frontal")
     estimator = make_estimator(with_it(effect, "frontal", what.coefficient), recording.test, "constrained_kalman")
     assert not isinstance(estimator, CompiledEstimator)
+
+
+def test_a_measured_force_s_zero_is_looked_for_as_far_as_accelerations_of_all_free_bodies_would_be():
+    block, _ = oscillator().bodies
+    bodies = (block, replace(block, name="load", mass=5.0, acceleration=("load_ax",)))
+    structure = replace(oscillator(), bodies=(*bodies, Body("wall", fixed=True, force="wall_fx")))
+    offset = EFFECTS["channel_offset"]
+    for channel in ("block_ax", "wall_fx"):
+        structure = offset.put_to_work(structure, None, EffectSpec("channel_offset", channel))
+    of_block, of_wall = structure.actions
+    assert (of_block.unit, of_wall.unit) == (offset.unit, "N")
+    assert of_wall.scale == pytest.approx((10.0 + 5.0) * of_block.scale)
 
 
 def test_a_zero_that_drifts_is_taken_out():

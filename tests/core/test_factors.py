@@ -2,18 +2,22 @@
 it."""
 
 from fractions import Fraction
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers_estimation import plain
 from numpy.testing import assert_allclose, assert_array_equal
 
+from crash_estimator.core.compiled import kalman
 from crash_estimator.core.compiled.factors import product_of, widen
 from crash_estimator.core.compiled.kalman import kalman_update
+from crash_estimator.core.compiled.plan import MethodPlan
 from crash_estimator.core.estimate import standard_deviations
 from crash_estimator.core.estimators.kalman import Kalman
 from crash_estimator.core.estimators.update import Theta
 from crash_estimator.core.methods import make_estimator
-from crash_estimator.core.regression import Regression
+from crash_estimator.core.regression import QUIETEST, Regression
 from crash_estimator.endurance.methods import TEST, least_eigenvalue, structure, vibration
 
 N, Q = 5, 3
@@ -95,6 +99,37 @@ def test_nothing_is_learnt_where_there_is_neither_noise_nor_uncertainty():
     update(theta, factors, np.zeros(1), np.array([[1.0, 0.0]]), np.array([5.0]), np.ones(2))
     assert_array_equal(theta, [1.0, 2.0])
     assert_array_equal(factors, np.diag([0.0, 4.0]))
+
+
+@pytest.mark.parametrize("missing", [[], [1]])
+def test_what_is_left_of_the_residuals_is_the_noise_less_what_has_been_fitted_to_it(missing):
+    """R2 - Psi P Psi', of equations that share their parameters; of one that was not measured their sum."""
+    rng = np.random.default_rng(2)
+    psi, target, factors, gain = rng.standard_normal((Q, N)), rng.standard_normal(Q), np.eye(N), np.empty((N, Q))
+    target[missing] = np.nan
+    kalman_update(np.zeros(N), factors, NOISE, psi, target, np.ones(N), -UNBOUNDED, UNBOUNDED, False, np.zeros(N), gain)
+    fitted = np.diagonal(psi @ product(factors) @ psi.T)
+    room = SimpleNamespace(gradient=psi, target=target, gain=gain, through=np.empty((Q, N)), spread=np.empty((Q, Q)))
+    found = np.empty(Q)
+    plain(kalman._left)(SimpleNamespace(factors=factors, noise=NOISE), room, found)
+    assert_allclose(found**2, np.where(np.isnan(target), NOISE + fitted, NOISE - fitted), rtol=1e-9)
+
+
+@pytest.mark.parametrize(("known", "least"), [(4.0, 4.0), (np.nan, QUIETEST**2)])
+def test_noise_that_adapts_to_a_model_without_errors_stays_at_what_is_known_of_the_sensor(monkeypatch, known, least):
+    for other in ("pass_one", "_left"):  # of which nothing is asked here
+        monkeypatch.setattr(kalman, other, lambda *given: None)
+    noise, one, square = np.array([np.nan]), np.ones(1), np.ones((1, 1))
+    errors = np.zeros((3, 1, 1))
+    state = kalman.Filter(2.0 * one, square.copy(), noise, np.zeros((1, 1)), errors)
+    room = SimpleNamespace(
+        walk=np.zeros(1), learnt=np.array([known]), gradient=square, target=2.0 * one, active=one, by_errors=errors,
+        errors=np.zeros((1, 7)), gain=square.copy(), through=square.copy(), unit=one.copy(), unfiltered=one.copy(),
+        seen=one.copy(),
+    )  # fmt: skip
+    limits, method = kalman.Limits(-UNBOUNDED[:1], UNBOUNDED[:1], one), MethodPlan(True, False, noise_memory=1e-12)
+    plain(kalman.filtered)(limits, method, state, 1e-3, room, np.zeros(1), square.copy(), one.copy())
+    assert_array_equal(noise, [least])
 
 
 @pytest.mark.parametrize("method", ["kalman", "constrained_kalman"])

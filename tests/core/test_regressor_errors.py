@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers_estimation import plain
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.benchmarks.coverage import LIMIT, looks, model_for, recorded, rows, simulated
+from crash_estimator.core.compiled.regressor_errors import known_of
 from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.core.regressor_errors import Consequence, MotionErrors, none_yet
@@ -35,6 +37,14 @@ def test_the_motion_s_errors_grow_as_integration_makes_them():
         assert_allclose(now[b], f @ then[b] @ f.T + VARIANCES[1][b] * added, rtol=1e-12)
     start = errors_at(0.0).covariance()
     assert_array_equal(start[0], np.diag([VARIANCES[0][0], VARIANCES[2][0], 0.0]))
+
+
+def test_the_compiled_form_knows_the_same_of_them():
+    known, expected = np.empty((B, 7)), errors_at(0.05).covariance()
+    plain(known_of)(*VARIANCES, 0.05, known)
+    for k, (one, other) in enumerate([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]):
+        assert_allclose(known[:, k], expected[:, one, other], rtol=1e-12)
+    assert_array_equal(known[:, 6], VARIANCES[1])
 
 
 def test_what_they_make_of_theta_is_the_joint_covariance_of_both_for_any_gains():

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers_diagnosis import hidden_case, so_far
+from helpers_estimation import oscillator, oscillator_recording
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.core.diagnosis.observation.bin_means import MOST_STEPS, in_bins
@@ -205,6 +206,15 @@ def test_a_coarse_record_keeps_the_means_and_the_noise_of_a_mean():
     used = record.measured[-count * per_bin :]
     assert_allclose(coarse.measured, used.reshape(count, per_bin, -1).mean(axis=1))
     assert_allclose(coarse.time[coarse.at][-1], record.time[record.at][-per_bin:].mean())
+
+
+def test_bins_are_as_long_as_a_record_asks_for_up_to_its_very_last_sample():
+    """40 ms at 10 kHz, the last sample 120 ms after those: 1 ms each, not the half that they would be without it."""
+    whole = oscillator_recording(n=401)
+    time_ns = whole.time_ns.copy()
+    time_ns[-1] += 120_000_000
+    record = observe(oscillator(), Recording(whole.test, time_ns, whole.values))
+    assert round(record.noise[0] ** 2 / in_bins(record).noise[0] ** 2) == 10
 
 
 def test_a_pass_that_begins_again_knows_nothing_of_later_samples(damped):

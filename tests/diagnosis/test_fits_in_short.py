@@ -5,11 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.linalg import LinAlgError
 from test_diagnosis_oracles import problem_of, structure
 from test_diagnosis_oracles_in_short import short_record
 
 from crash_estimator.core.diagnosis.mechanics.linearization import _steps
 from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.diagnosis.output_error import gauss_newton
 from crash_estimator.core.diagnosis.output_error.gauss_newton import fit
 from crash_estimator.core.diagnosis.output_error.problem import make_problem
 from crash_estimator.core.diagnosis.output_error.simulation import simulate
@@ -49,6 +51,26 @@ def test_a_fit_ends_after_its_last_step_where_that_is_better(recording):
     settled, once = fit(problem, start), fit(problem, start, most=1)
     assert abs(once.theta[term] - settled.theta[term]) < 0.1 * abs(theta[term] - settled.theta[term])
     assert once.theta[term] != theta[term]
+
+
+def test_a_step_after_which_nothing_is_finite_is_halved_until_a_thirty_second_is_left(recording, monkeypatch):
+    problem, _ = problem_of(structure(EffectSpec("viscous_damping", "foam", 0.0)), recording)
+    term = problem.layout.terms[0].coefficient
+    theta = problem.layout.start.copy()
+    theta[term] += 300.0
+    start = simulate(problem, theta, problem.measured(theta).trajectories)
+    asked, of_the_start = [], gauss_newton.normal_equations
+
+    def only_at_the_start(problem, point, stage):
+        asked.append(point.theta[term])
+        if len(asked) > 1:
+            raise LinAlgError
+        return of_the_start(problem, point, stage)
+
+    monkeypatch.setattr(gauss_newton, "normal_equations", only_at_the_start)
+    assert fit(problem, start).cost == np.inf
+    way = np.array(asked[1:]) - asked[0]
+    assert_allclose(way / way[0], [1.0, 1 / 2, 1 / 4, 1 / 8, 1 / 16, 1 / 32])
 
 
 @pytest.mark.parametrize("dt", [(0.0, 2e-4), (0.0, 2e-4, 1e-4)])

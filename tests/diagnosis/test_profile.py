@@ -1,13 +1,16 @@
 """Laws found over their constant, where a jump at separation stops every other fit; and a mass as it was weighed."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.diagnosis.output_error import profile_likelihood
 from crash_estimator.core.diagnosis.output_error.gauss_newton import fit
 from crash_estimator.core.diagnosis.output_error.problem import make_problem
-from crash_estimator.core.diagnosis.output_error.profile_likelihood import closer, profile
+from crash_estimator.core.diagnosis.output_error.profile_likelihood import STEP, closer, profile
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 from crash_estimator.core.diagnosis.report.diagnosis import diagnose
 from crash_estimator.core.diagnosis.selection.candidates import candidates
@@ -25,6 +28,21 @@ def drawn(structure: str, seed: int, noise: float):
     case = draw_case(structure, ("plastic_unloading",), seed)
     model = ModelFile.model_validate(dict(case.specimen.model)).structure()
     return case.hidden[0], model, [case.record(speed, noise)[0] for speed in (0.75, 1.1)]
+
+
+@pytest.mark.parametrize("least", [0.0, 2.2, 3.8])
+def test_the_look_at_a_profile_goes_on_beyond_the_largest_start_as_long_as_the_cost_falls(monkeypatch, least):
+    """The cost is a V over the logarithm, its point at or beyond that of the one start."""
+    layout = SimpleNamespace(
+        start=np.ones(1), prior=SimpleNamespace(low=np.zeros(1)), term=lambda addition: SimpleNamespace(coefficient=0)
+    )
+    problem = SimpleNamespace(layout=layout, starting_at=lambda start: start)
+    monkeypatch.setattr(
+        profile_likelihood, "fit", lambda start, **more: SimpleNamespace(cost=abs(np.log(start[0]) - least))
+    )
+    found = profile(problem, None, [1.0])
+    assert abs(found.at - least) <= STEP / 2.0
+    assert found.fit.cost == pytest.approx(abs(found.at - least))
 
 
 @pytest.mark.parametrize(("seed", "noise"), [(420018, 0.5), (420001, 2.0)])

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from helpers_paths import ROOT
 
 from crash_estimator.cli import diagnose as command
 from crash_estimator.core.diagnosis import diagnose
+from crash_estimator.core.diagnosis.report import diagnosis as report
 from crash_estimator.core.diagnosis.report.left import ChannelLeft, Left
 from crash_estimator.core.diagnosis.report.ranking import Ranked
 from crash_estimator.core.diagnosis.report.tolerance import DEFAULT, Tolerance, tolerance_of
@@ -77,6 +79,40 @@ LITTLE, DROWNED = left(0.009, 1.0), left(0.009, 0.13)
 )  # fmt: skip
 def test_what_is_said_of_which_evidence(changed, tolerance, word, complete):
     assert verdict_on(EVIDENCE._replace(**changed), tolerance) == (word, complete)
+
+
+@pytest.mark.parametrize(("inflated", "rms", "weighed"), [
+    (True, 6.0, True), (True, 0.11, True), (False, 0.11, True), (False, 6.0, False),
+])  # fmt: skip
+def test_evidence_is_weighed_in_noise_as_large_as_what_is_left_or_where_next_to_nothing_is_left(
+    monkeypatch, inflated, rms, weighed
+):
+    """Of 10 m/s^2 as given; the sensors' noise is 0.1."""
+    given = SimpleNamespace(fit=None)
+    fit = SimpleNamespace(problem=SimpleNamespace(noise_is_inflated=inflated))
+    final = SimpleNamespace(fit=fit, white=False, additions=("friction",))
+    path = SimpleNamespace(
+        steps=[SimpleNamespace(before=given)], final=final, present=0, added=final.additions, as_recorded=None
+    )
+    made_up = {
+        "band_of": None, "free_run": SimpleNamespace(rms=1.0), "fit_of_all": None, "drift_of": STANDS_STILL,
+        "step_of": SimpleNamespace(coefficient=5.0, std=1.0), "ranking_of": (LEADER,), "_removed_by_first_effect": 0.0,
+    }  # fmt: skip
+    for name, said in made_up.items():
+        monkeypatch.setattr(report, name, lambda *given, said=said: said)
+    monkeypatch.setattr(report, "left_by", lambda model, band: left(0.2, 10.0 if model is given else rms))
+
+    class Asked(Exception):
+        pass
+
+    def asked(evidence, tolerance):
+        raise Asked(evidence)
+
+    monkeypatch.setattr(report, "verdict_on", asked)
+    with pytest.raises(Asked) as found:
+        report._answer(None, path, DEFAULT, None)
+    (evidence,) = found.value.args
+    assert evidence.weighed == weighed
 
 
 def test_a_tolerance_is_a_rating_or_a_share_of_the_peak():

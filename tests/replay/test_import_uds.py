@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from crash_replay.readers import read_source
 from crash_replay.readers.codes.nhtsa import code_of_attachment, code_of_status
 from crash_replay.readers.codes.nhtsa_library import DATA_STATUS, SENSOR_ATTACHMENTS
-from crash_replay.readers.uds import _floats
+from crash_replay.readers.uds import _floats, read_uds
 from crash_replay.recording import RecordingError
 
 
@@ -41,6 +41,16 @@ def test_the_same_test_as_in_ev5_form(expected, tmp_path, form, xy):
     assert (
         "outlier vehicle1_floor_left_rear_ax" in notes and "closing speed 90 km/h, test mass 1200 kg, 1800 kg" in notes
     )
+
+
+@pytest.mark.parametrize("form", ["IEEE", "VAX", "SUN"])
+def test_of_a_last_record_that_is_not_full_only_the_curve_s_samples_are_read(tmp_path, form):
+    record, values = records()[0]
+    file = tmp_path / "v07292.001"
+    file.write_bytes(uds_file(record.split("|"), values[:132], 7292, form))
+    (curve,) = read_uds(file)
+    assert curve.y.shape == (132,)
+    assert_allclose(curve.y, values[:132], rtol=1e-6)
 
 
 def test_numbers_of_a_vax():

@@ -193,7 +193,7 @@ def _acting(link: Link, theta: np.ndarray) -> Link:
 
 def _steps(record: ObservedRecord) -> np.ndarray:
     """(g,) length of the step that an instant stands for."""
-    return np.maximum(record.dt, record.dt[1] if len(record.dt) > 1 else 1e-4)
+    return np.maximum(record.dt, record.dt[1])
 
 
 def _measured(layout: Layout, body: int) -> bool:
