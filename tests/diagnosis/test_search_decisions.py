@@ -26,7 +26,7 @@ def candidate(gain, key=("friction", "spring"), fitted=True):
 
 
 CARE = ["slowly", "other_variants", "anew", "from_motion"]
-MORE = ["from_model", "from_motion", "profile", "from_motion"]
+MORE = ["from_model", "from_motion", "profile", "from_motion", "slowly", "anew"]
 
 
 @pytest.mark.parametrize(

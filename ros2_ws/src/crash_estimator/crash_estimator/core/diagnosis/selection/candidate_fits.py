@@ -10,6 +10,7 @@ from ...effects.effect import Addition, Effect
 from ..output_error.continuation import (
     FROM_MEASURED_MOTION,
     FROM_SIMULATION,
+    LARGE_NOISE,
     SLOW_CONTACT,
     SMALL_STEPS,
     Schedule,
@@ -79,6 +80,8 @@ def fit_candidates(
             lambda: search.from_motion(shortlist(worth, short) + shortlist(by_motion, long)),
             search.profile,
             lambda: search.from_motion([one for a in gridded for one in grid_starts(magnitudes, model, a)]),
+            search.slowly,
+            lambda: search.anew(LARGE_NOISE),
         )
         for harder in (*with_care, *more_of_them):
             if out_of_time():
