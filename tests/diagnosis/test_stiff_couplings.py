@@ -30,6 +30,7 @@ def test_a_model_whose_mount_was_found_too_soft_is_fitted_again_from_what_is_sta
     assert usual.residuals.mean_square > 10.0, "the usual fit arrives: this test shows nothing"
     assert usual.fit.theta[mount] < 0.5 * as_given.fit.theta[mount]
     assert as_given.residuals.mean_square < 1.3
+    assert fit(usual.fit.problem.starting_as_stated()).cost < 1.01 * as_given.fit.cost
 
 
 def test_a_candidate_starts_from_the_mount_that_was_found_without_it(given):

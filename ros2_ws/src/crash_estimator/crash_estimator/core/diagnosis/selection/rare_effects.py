@@ -1,6 +1,6 @@
 """Rare effects bend far, and one of them with another beside it would follow most that no vocabulary has: they are
 asked after the common ones, in a first step only, and believed only where one of them alone leaves noise, or next to
-nothing else where no common one leaves noise."""
+nothing else where no common one comes near."""
 
 from collections.abc import Iterable, Mapping
 
