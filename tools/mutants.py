@@ -12,12 +12,13 @@ Python (NUMBA_DISABLE_JIT): so its lines are seen, and nothing is compiled anew 
 
 import argparse
 import ast
+import hashlib
 import json
-import random
 import re
 import time
 from collections import Counter
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -119,15 +120,24 @@ def _changes(node: ast.AST, lines: list[str]) -> list[tuple[int, int, int, str, 
 
 
 def drawn(count: int, seed: int, only: str = "") -> list[Mutant]:
-    """As many as asked for, the same for the same seed: of each part its share, one for each line at most."""
-    rng, chosen = random.Random(seed), []
+    """As many as asked for: of each part its share, one for each line at most.
+
+    A seed puts them in an order that depends on their text alone: where the code is changed elsewhere, they stay.
+    """
+    in_order = partial(_place_in_order, seed=seed)
+    chosen = []
     for part, (package, share) in PARTS.items():
         files = sorted((SOURCES / package / package / part).rglob("*.py"))
-        every = [m for path in files for m in mutants_of(part, path) if only in str(m.path)]
-        rng.shuffle(every)
-        chosen += list({(m.path, m.line): m for m in every}.values())[: round(count * share)]
-    rng.shuffle(chosen)
-    return chosen
+        of_line: dict[tuple[Path, int], Mutant] = {}
+        for mutant in sorted((m for path in files for m in mutants_of(part, path)), key=in_order):
+            if only in str(mutant.path):
+                of_line.setdefault((mutant.path, mutant.line), mutant)
+        chosen += list(of_line.values())[: round(count * share)]
+    return sorted(chosen, key=in_order)
+
+
+def _place_in_order(mutant: Mutant, seed: int) -> str:
+    return hashlib.sha256(f"{seed} {_name(mutant)}".encode()).hexdigest()
 
 
 class Verdict(NamedTuple):

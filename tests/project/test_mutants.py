@@ -19,6 +19,18 @@ def test_a_seed_draws_the_same_of_every_part():
     assert len({(mutant.path, mutant.line) for mutant in drawn}) == len(drawn) == 40
 
 
+def test_a_change_elsewhere_leaves_the_draw_as_it_is(tmp_path, monkeypatch):
+    """Else what survived before would be judged no more as soon as a test for it has mended a line."""
+    monkeypatch.setattr(mutants, "SOURCES", tmp_path)
+    monkeypatch.setattr(mutants, "PARTS", {"core": ("a", 1.0)})
+    (file := tmp_path / "a" / "a" / "core" / "one.py").parent.mkdir(parents=True)
+    lines = [f"    y = x * {n} + {n + 1}" for n in range(50)]
+    file.write_text("\n".join(["def f(x):", *lines]))
+    before = {mutant.before for mutant in mutants.drawn(20, seed=1)}
+    file.write_text("\n".join(["def f(x):", "    z = x - 3", *lines]))
+    assert len({mutant.before for mutant in mutants.drawn(20, seed=1)} - before) <= 1
+
+
 def test_each_changes_one_line_into_code_that_can_be_read():
     for mutant in mutants.drawn(60, seed=3):
         lines = (PACKAGES / mutant.path).read_text().splitlines()

@@ -77,6 +77,20 @@ def test_all_samples_all_estimates_and_the_final_answer_are_complete():
     assert graph.account.through("/kalman") and graph.account.through("/diagnosis")
 
 
+def test_who_is_known_to_the_replay_alone_is_waited_for_and_named():
+    """On a busy machine a diagnosis was found after the replay's end only: its answer was lost, without a word."""
+    graph = whole()
+    graph.account.known_to_replay = {"/second": "diagnosis", "/other": "estimator", "/rerun": "viewer"}
+    assert graph.account.nodes("estimator", "diagnosis") == ["/diagnosis", "/kalman", "/other", "/second"]
+    assert not graph.account.through("/second") and not graph.account.through("/other")
+    parameters, residuals, answer = graph.account.missing()
+    assert parameters.startswith("/other/block/parameters: 0 of 100, without 0 to 99 (the replay hears /other, ")
+    assert residuals.startswith("/other/block/residuals: 0 of 100")
+    assert answer == "/second/ranking: no final answer (the replay hears /second, no word of it came here)"
+    graph.say("/second", "diagnosis", next=100, done=True)
+    assert graph.account.through("/second")
+
+
 def test_what_is_missing_is_named_with_how_many_which_and_why():
     graph = whole()
     graph.account.begin_test(100)

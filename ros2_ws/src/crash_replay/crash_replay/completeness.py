@@ -78,6 +78,7 @@ class Completeness:
         self.revisions: dict[str, int] = {}  # by estimator, of its model
         self.total = 0  # samples of the test
         self.replayed: Pass | None = None
+        self.known_to_replay: dict[str, str] = {}  # node that it hears and that is there -> its role
 
     def found(self, topic: str, kind: str) -> None:
         self.types[topic] = kind
@@ -117,8 +118,15 @@ class Completeness:
         must = [topic for topic, kind in topics.items() if self.choice.wants(topic, kind)]
         return [topic for topic in must if topic in self.types or not topic.endswith("/forces")]
 
+    def nodes(self, *roles: str) -> list[str]:
+        """Who has said a word of himself, here or to the replay: on a busy machine one may be found here too late."""
+        known = (name for name, role in self.known_to_replay.items() if role in roles)
+        return sorted({*self.others.names(*roles), *known})
+
     def through(self, node: str) -> bool:
         """Whether nothing more is to be expected of an estimator or a diagnosis."""
+        if self.others.word(node) is None:
+            return False
         if self.others.state(node) in GONE or self.others.silence(node) > SILENT_FOR:
             return True
         word, of = self.others.word(node), self.last_pass
@@ -137,9 +145,9 @@ class Completeness:
         missing = [self._missing_of(topic, of, "") for topic in self.samples()]
         if not self.samples() and self.replayed and self.choice.wants(self.samples_topic, SAMPLES):
             missing.append("samples: the topic was not found")
-        for node in self.others.names(ESTIMATOR):
+        for node in self.nodes(ESTIMATOR):
             missing += [self._missing_of(topic, of, self._why(node)) for topic in self.estimates(node)]
-        for node in self.others.names(DIAGNOSIS) if of.finished and of.sent == of.total else []:
+        for node in self.nodes(DIAGNOSIS) if of.finished and of.sent == of.total else []:
             topic = f"{node}/ranking"
             if self.choice.wants(topic, "crash_msgs/msg/Ranking") and self.finals.get(node) != of.run:
                 missing.append(f"{topic}: no final answer{_because(self._why(node))}")
@@ -158,7 +166,9 @@ class Completeness:
         return f"{topic}: {needed - len(lacking)} of {needed}, without {shown}{more}{_because(because)}"
 
     def _why(self, node: str) -> str:
-        word, state = self.others.word(node), self.others.state(node)
+        if (word := self.others.word(node)) is None:
+            return f"the replay hears {node}, no word of it came here"
+        state = self.others.state(node)
         how = self.others.how(node, state) if state in (State.LEFT, State.KILLED, State.SILENT) else ""
         return "; ".join(filter(None, [f"{node} {how}" if how else "", word.reason]))
 

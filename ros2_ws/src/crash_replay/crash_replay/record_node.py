@@ -144,6 +144,7 @@ class RecordNode(Node):
         if state is not None and state.total:
             finished = state.state == ReplayState.FINISHED
             self.account.replayed = Pass(state.run, state.first, state.number, state.total, finished)
+            self.account.known_to_replay = {one.node: one.role for one in state.listeners if one.state not in GONE}
 
     def _replay_is_gone(self) -> bool:
         others = self.attending.others
@@ -154,7 +155,7 @@ class RecordNode(Node):
         return self.replayed and not there
 
     def _all_are_through(self) -> bool:
-        return all(self.account.through(name) for name in self.attending.others.names(ESTIMATOR, DIAGNOSIS))
+        return all(self.account.through(name) for name in self.account.nodes(ESTIMATOR, DIAGNOSIS))
 
     def _end_full(self, error: OSError) -> None:
         self.full = error
