@@ -1,6 +1,7 @@
 """Many passes and many tests through the viewer's recorder: each in its own recording, and none is held on to."""
 
 import os
+from dataclasses import replace
 from threading import Event
 
 import helpers_viewer as crash_data
@@ -66,7 +67,7 @@ def test_tests_of_one_structure_and_length_share_a_layout(monkeypatch):
     target = Recorder(Sinks(0), ("mrls",))
     for k in range(4):
         crash = crash_data.simulate(n=SHORT if k < 3 else SHORT + 7)
-        target.put(lambda crash=crash, k=k: crash_data.test_block(crash)._replace(id=f"test {k}"))
+        target.put(lambda crash=crash, k=k: replace(crash_data.test_block(crash), id=f"test {k}"))
         for block in crash_data.estimates(crash, "mrls"):
             target.put(lambda block=block: block)
         settle(target)

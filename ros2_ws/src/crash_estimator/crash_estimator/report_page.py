@@ -213,6 +213,9 @@ def _free_runs(
         lines += [Line(run.time * 1e3, column(name), name, colours[name]) for name, run in simulated.items()]
         return Panel(title, "time in ms", shown, lines)
 
+    def predicted(column: Mapping[str, int], factor: float, name: str) -> np.ndarray:
+        return smooth(simulated[name].predicted[:, column[name]]) * factor
+
     for k, (equation, unit) in enumerate(zip(result.description.equations, result.description.equation_units)):
         shown, factor = readable(unit, first.measured[:, k])
         at = {name: r.description.equations.index(equation) for name, (_, r) in runs.items()}
@@ -221,7 +224,7 @@ def _free_runs(
                 f"{equation}, {compared}",
                 shown,
                 smooth(first.measured[:, k]) * factor,
-                lambda name, at=at, factor=factor: smooth(simulated[name].predicted[:, at[name]]) * factor,
+                partial(predicted, at, factor),
             )
         )
     for k, body in enumerate(structure.bodies):

@@ -25,7 +25,8 @@ class Range(NamedTuple):
 
     def wrong(self, value: Any) -> str:
         """ "must be ..., got ..." for what is no number, not finite or out of range; a truth value is no number."""
-        if isinstance(value, Real) and not isinstance(value, bool) and self.lowest <= value <= self.highest:
+        number: Any = value if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+        if self.lowest <= number <= self.highest:
             return ""
         ends = f"a number from {self.lowest:g} to {self.highest:g} {self.unit}".rstrip()
         return f"must be {ends}, got {shown(value)}"

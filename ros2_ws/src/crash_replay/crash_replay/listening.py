@@ -2,7 +2,9 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
+from typing import Any
 
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -51,7 +53,8 @@ class Listening:
         self.newest = time.monotonic()
         package, _, message = kind.split("/")
         message_type = getattr(import_module(f"{package}.msg"), message)
-        self.node.create_subscription(message_type, name, lambda data: self.hear(topic, data), qos, raw=True)
+        heard: Any = partial(self.hear, topic)  # raw: it is given bytes, of which rclpy's types know nothing
+        self.node.create_subscription(message_type, name, heard, qos, raw=True)
         self.node.get_logger().info(f"recording {name}")
         return topic
 

@@ -1,6 +1,7 @@
 """docs/missing-effects.md: what the search for the missing effect finds, and where it ends."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 from crash_replay.synthetic.hidden.outside import OUTSIDE
@@ -175,11 +176,15 @@ def _two(drawn: Sequence[Judged]) -> str:
     return markdown_table(("structure", "both found, nothing else", "`effect_missing`"), rows)
 
 
+def _is(what: str, value: float, judged: Judged) -> bool:
+    return getattr(judged.case, what) == value
+
+
 def _hard(drawn: Sequence[Judged]) -> str:
     """Right first, and where it is not, whether something wrong was named."""
     columns: list[tuple[str, Callable[[Judged], bool]]] = [("as it is", lambda j: j.nominal and j.case.noise == 1.0)]
-    columns += [(f"size 1/{1 / size:.0f}", lambda j, size=size: j.case.size == size) for size in SIZES]
-    columns += [(f"{noise:g} g", lambda j, noise=noise: j.case.noise == noise) for noise in HARD_NOISES]
+    columns += [(f"size 1/{1 / size:.0f}", partial(_is, "size", size)) for size in SIZES]
+    columns += [(f"{noise:g} g", partial(_is, "noise", noise)) for noise in HARD_NOISES]
     columns += [("1 kHz", lambda j: j.case.rate == SLOW)]
     two, single = _pick(drawn, "one", 2, nominal=False), _pick(drawn, "one", 1)
     groups = [(name, [j for j in two if chosen(j)]) for name, chosen in columns]

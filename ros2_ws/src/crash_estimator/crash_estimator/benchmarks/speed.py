@@ -6,7 +6,9 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from crash_replay.fault import guarded
 from crash_replay.output import check_outputs
@@ -66,7 +68,7 @@ def _parts(folder: Path, effort: Effort, arguments) -> Iterator[tuple[str, Calla
     if "steps" in arguments.only:
         yield "steps", lambda: list(steps(folder))
     if "growth" in arguments.only:
-        shorter = {"seconds": (0.1, 1.0), "parameters": (2, 6)} if arguments.quick else {}
+        shorter: dict[str, Any] = {"seconds": (0.1, 1.0), "parameters": (2, 6)} if arguments.quick else {}
         yield "growth", lambda: list(growth(folder, **shorter))
     live = [name for name in PARTS[3:] if name in arguments.only]
     if not live:
@@ -76,7 +78,11 @@ def _parts(folder: Path, effort: Effort, arguments) -> Iterator[tuple[str, Calla
     start_ros(environment)
     graph = Live(folder, environment, effort)
     for name in live:
-        yield name, lambda name=name: list(getattr(graph, name)())
+        yield name, partial(_rows_of, getattr(graph, name))
+
+
+def _rows_of(measure: Callable[[], Iterator[Row]]) -> list[Row]:
+    return list(measure())
 
 
 if __name__ == "__main__":

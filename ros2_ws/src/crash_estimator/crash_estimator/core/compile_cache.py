@@ -32,7 +32,7 @@ def _fingerprint(core: Path) -> str:
 
 _cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "crash_estimator"
 if not os.environ.get("NUMBA_CACHE_DIR"):
-    config.CACHE_DIR = str(_cache / _fingerprint(Path(__file__).parent))
+    config.CACHE_DIR = str(_cache / _fingerprint(Path(__file__).parent))  # type: ignore[attr-defined]  # numba's own
 
 
 class _Once(Listener):

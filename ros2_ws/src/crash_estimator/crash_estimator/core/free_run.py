@@ -7,7 +7,7 @@ sample by sample need not hold here: errors of the force add up in velocity and 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,16 @@ from .structure_parts import NOTHING, outlasts
 
 LONGEST_STEP = 2e-4
 """s; a coarser recording is simulated in several steps a sample."""
+
+
+class Instant(NamedTuple):
+    """An element's motion at one instant; see ElementMotion."""
+
+    time: float  # s since the impact
+    crush: float  # m
+    rate: float  # m/s
+    peak: float  # m
+    static: float = 0.0  # N
 
 
 class FreeRun(NamedTuple):
@@ -174,12 +184,12 @@ class _System:
         memory = self.remembered(state, t, crush)
         peak = np.maximum(state.peak, crush)
         force = np.array([
-            self.force(k, law, ElementMotion(t, c, r, p, 0.0), memory)
+            self.force(k, law, Instant(t, c, r, p), memory)
             for k, (law, c, r, p) in enumerate(zip(self.laws, crush, rate, peak, strict=True))
         ])  # fmt: skip
         return np.where(self.never_pulls, np.maximum(force, 0.0), force)
 
-    def force(self, element: int, law: Characteristic, motion: ElementMotion, memory: np.ndarray) -> float:
+    def force(self, element: int, law: Characteristic, motion: Instant, memory: np.ndarray) -> float:
         """N, of an element at one instant."""
         inside = self.inside(element, motion)
         spent = not law.carries(motion.crush, motion.peak, inside)
@@ -194,7 +204,7 @@ class _System:
         parallel, factor = beside_the_springs(self.structure, self.c, element, instant, memory, spent)
         return float(spring * factor[0] + damper + parallel[0])
 
-    def inside(self, element: int, motion: ElementMotion) -> float:
+    def inside(self, element: int, motion: Instant) -> float:
         """N that effects add to an element's own curve where it is read."""
         if not any(action.in_curve for action in self.structure.actions):
             return 0.0
@@ -251,7 +261,7 @@ class _System:
         return self.ended(t + h, x, v, state)
 
 
-def _applied(structure: Structure, recording: Recording | None) -> dict[int, Callable[[float], float]]:
+def _applied(structure: Structure, recording: Recording | None) -> dict[int, Callable[..., Any]]:
     """N of the time in s since the impact, by body."""
     found = {}
     for k, body in enumerate(structure.bodies):
@@ -293,5 +303,6 @@ def _comparison(name: str, unit: str, measured: np.ndarray, simulated: np.ndarra
         rating = None
     if not valid.any():
         return Comparison(name, unit, np.nan, np.nan, np.nan, rating)
-    peaks = [float(s[valid][np.argmax(np.abs(s[valid]))]) for s in (measured, simulated)]
-    return Comparison(name, unit, *peaks, float(np.sqrt(np.mean((measured - simulated)[valid] ** 2))), rating)
+    peak, simulated_peak = (float(s[valid][np.argmax(np.abs(s[valid]))]) for s in (measured, simulated))
+    rms = float(np.sqrt(np.mean((measured - simulated)[valid] ** 2)))
+    return Comparison(name, unit, peak, simulated_peak, rms, rating)

@@ -49,7 +49,7 @@ class Motion(NamedTuple):
 
 class KinematicState(NamedTuple):
     time_ns: int  # of the last sample after the impact; -1 before
-    count: np.ndarray  # (channels,) pre-impact samples
+    count: np.ndarray  # type: ignore[assignment]  # (channels,) pre-impact samples; hides the tuple's own method
     offset: np.ndarray  # (channels,) their mean: the zero offset
     squares: np.ndarray  # (b,) sum of squared accelerations before the impact, their running mean removed
     force_squares: np.ndarray  # (q,) the same of measured forces

@@ -1,6 +1,7 @@
 """crash_msgs -> the viewer's blocks: the one file of the viewer that knows both worlds."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from crash_msgs.msg import (
@@ -23,34 +24,30 @@ from ..viewer.findings import Candidate, MisfitBlock, RankingBlock, RevisionBloc
 
 
 def test_block(message: TestInfo) -> TestBlock:
-    about = map(visible, (message.id, message.title, message.source))
-    return TestBlock(*about, int(message.samples), float(message.sample_period))
+    name, title, source = map(visible, (message.id, message.title, message.source))
+    return TestBlock(name, title, source, int(message.samples), float(message.sample_period))
 
 
 def parameter_block(estimator: str, message: ParametersBlock) -> ParameterBlock:
     names = tuple(message.name)
-    return ParameterBlock(
-        *_head(estimator, message),
-        names,
-        tuple(message.unit),
-        **_tables(message, len(names), said_of(ParameterBlock)),
-    )
+    said = _tables(message, len(names), said_of(ParameterBlock))
+    return ParameterBlock(**_head(estimator, message), name=names, unit=tuple(message.unit), **said)
 
 
 def residual_block(estimator: str, message: ResidualsBlock) -> ResidualBlock:
     names = tuple(message.name)
     said = _tables(message, len(names), said_of(ResidualBlock))
-    return ResidualBlock(*_head(estimator, message), names, tuple(message.unit), **said)
+    return ResidualBlock(**_head(estimator, message), name=names, unit=tuple(message.unit), **said)
 
 
 def force_block(estimator: str, message: Forces) -> ForceBlock:
     elements, bodies = tuple(message.element), tuple(message.body)
     return ForceBlock(
-        *_head(estimator, message),
-        elements,
-        tuple(message.between),
-        bodies,
-        np.asarray(message.mass),
+        **_head(estimator, message),
+        element=elements,
+        between=tuple(message.between),
+        body=bodies,
+        mass=np.asarray(message.mass),
         **_tables(message, len(elements), said_of(ForceBlock, "elements")),
         **_tables(message, len(bodies), said_of(ForceBlock, "bodies")),
     )
@@ -127,14 +124,20 @@ FINDING_OF = {
 """A topic of the diagnosis -> its message type and what makes a finding of it."""
 
 
-def _head(estimator: str, message: ParametersBlock | ResidualsBlock | Forces) -> tuple:
-    time_ns = np.asarray(message.time_ns, dtype=np.int64)
-    return speaker(estimator, message.revision), message.run, message.number, time_ns, message.model, message.method
+def _head(estimator: str, message: ParametersBlock | ResidualsBlock | Forces) -> dict[str, Any]:
+    return {
+        "estimator": speaker(estimator, message.revision),
+        "run": message.run,
+        "number": message.number,
+        "time_ns": np.asarray(message.time_ns, dtype=np.int64),
+        "model": message.model,
+        "method": message.method,
+    }
 
 
 def _tables(
     message: ParametersBlock | ResidualsBlock | Forces | Revision, width: int, fields: Sequence[str]
-) -> dict[str, np.ndarray]:
+) -> dict[str, Any]:
     """Fields of n x width values, sent row by row. Raises RecordingError where a length does not fit."""
     n = len(message.time_ns)
     for name in fields:

@@ -5,14 +5,16 @@ A block holds n consecutive samples; its `estimator` says who speaks, which is e
 """
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ..core.estimate import sent
 
 
-class TestBlock(NamedTuple):
+@dataclass(frozen=True)
+class TestBlock:
     """What the test is."""
 
     id: str
@@ -21,7 +23,7 @@ class TestBlock(NamedTuple):
     samples: int
     sample_period: float  # s
 
-    __test__ = False  # not a pytest class
+    __test__: ClassVar[bool] = False  # not a pytest class
 
 
 REVISION = " revision "
@@ -140,4 +142,5 @@ def _joined(group: list[Block]) -> Block:
     if len(group) == 1:
         return first
     over_time = ("time_ns", *said_of(first))
-    return first._replace(**{name: np.concatenate([getattr(b, name) for b in group]) for name in over_time})
+    joined: dict[str, Any] = {name: np.concatenate([getattr(b, name) for b in group]) for name in over_time}
+    return first._replace(**joined)

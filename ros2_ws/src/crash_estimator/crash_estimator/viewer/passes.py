@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import rerun as rr
 
@@ -60,7 +61,7 @@ class Pass:
         self._waiting: list[Block | EventBlock | Finding] = []
         self._unsaved: list[Block | EventBlock | Finding] = []
         self._saved_at = 0.0  # monotonic s
-        self._heads: dict[str, dict[type, Block]] = {}  # each estimator's newest block of each kind
+        self._heads: dict[str, dict[type, Any]] = {}  # each estimator's newest block of each kind
 
     def set_test(self, test: TestBlock) -> None:
         self.test = test

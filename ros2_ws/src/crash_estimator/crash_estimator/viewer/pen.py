@@ -1,7 +1,7 @@
 """Writing to one Rerun recording: columns of samples at once, styles once."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -24,7 +24,7 @@ def own_path(*parts: str, who: str) -> str:
     return path(*parts, f"revision {revision_of(who):02}" if revision_of(who) else "model", estimator_of(who))
 
 
-def points(ui_points: float) -> rr.components.Radius:
+def points(ui_points: float) -> Any:
     """A line's radius or a point's in pixels of the screen, whatever the zoom."""
     return rr.Radius.ui_points(ui_points)
 

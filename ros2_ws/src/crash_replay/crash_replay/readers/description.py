@@ -16,9 +16,10 @@ from ..yaml_schema import Text, load_yaml, number, suggestion
 from .dates import checked_stamp
 
 Axis = Literal["x", "y", "z", ""]
-Velocities = dict[Text, number(VELOCITY)]
+Velocity, Displacement = number(VELOCITY), number(DISPLACEMENT)
+Velocities = dict[Text, Velocity]
 """Body -> m/s."""
-Displacements = dict[Text, number(DISPLACEMENT)]
+Displacements = dict[Text, Displacement]
 """Body -> m."""
 
 

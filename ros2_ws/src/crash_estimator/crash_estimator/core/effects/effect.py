@@ -84,13 +84,17 @@ class Effect:
 
     # Its place in the rest of the model
     attaches_body: ClassVar[bool] = False  # a further body, driven by the channel that is the target
-    distorts: ClassVar[str] = ""  # what it makes wrong of a channel: delay, gain or offset
     balances_momentum: ClassVar[bool] = False  # it changes what masses and forces must add up to
     replaces: ClassVar[str] = ""  # the element's key in a model file that it takes the place of
 
     # How a diagnosis searches for it
     profiled: ClassVar[bool] = False  # its coefficient says when a force jumps to zero: the cost has a V over it
     restated: ClassVar[bool] = False  # the literature states the coefficient otherwise than it is fitted
+
+    @property
+    def distorts(self) -> str:
+        """What it makes wrong of a channel: delay, gain or offset."""
+        return ""
 
     @property
     def variants(self) -> tuple[str, ...]:

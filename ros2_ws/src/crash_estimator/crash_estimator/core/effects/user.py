@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import wraps
 from numbers import Real
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -57,10 +58,10 @@ def _checked(path: str | Path, effect: Effect) -> Effect:
         return effect
     if not callable(getattr(effect, function)):
         raise ModelError(f"{where}: {function} must be a function, got {shown(getattr(effect, function))}")
-    guarded = replace(
-        effect, **{function: _guarded(f"{path}: {function} of {effect.name!r}", getattr(effect, function))}
-    )
-    _try_out(f"{path}: {function} of {effect.name!r}", guarded)
+    said = f"{path}: {function} of {effect.name!r}"
+    changed: dict[str, Any] = {function: _guarded(said, getattr(effect, function))}
+    guarded = replace(effect, **changed)
+    _try_out(said, guarded)
     return guarded
 
 

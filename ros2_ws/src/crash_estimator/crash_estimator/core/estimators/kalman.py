@@ -108,7 +108,7 @@ class Kalman:
                 gains.append(gain)
             return both, root
 
-        bounds = self.settings if self.constrained else self.settings._replace(lower=-np.inf, upper=np.inf)
+        bounds = self.settings if self.constrained else _unbounded(self.settings)
         updated, clamped = within_bounds(lambda t, free: assimilate(t, free)[0][:p], theta, regression.active, bounds)
         held = np.where(clamped, updated, theta)
         both, root = assimilate(held, regression.active & ~clamped)
@@ -198,6 +198,10 @@ def _with_offsets(root: np.ndarray, variance: np.ndarray) -> np.ndarray:
     return grown
 
 
+def _unbounded(settings: Theta) -> Theta:
+    return settings._replace(lower=np.full_like(settings.lower, -np.inf), upper=np.full_like(settings.upper, np.inf))
+
+
 def covariance_of(root: np.ndarray) -> np.ndarray:
     """S (p, n) -> S S' (p, p)."""
     covariance = root @ root.T
@@ -206,4 +210,4 @@ def covariance_of(root: np.ndarray) -> np.ndarray:
 
 def narrowed(root: np.ndarray) -> np.ndarray:
     """S (p, n) -> a triangular root (p, p) of the same S S', n >= p."""
-    return np.linalg.qr(root.T, mode="r").T
+    return np.asarray(np.linalg.qr(root.T, mode="r")).T

@@ -39,6 +39,7 @@ class OrderBank:
     memory: float = 0.005  # s, as in RLS
     printed: bool = False  # the members follow the thesis's 4.10 as printed; it has no such bank
     members: tuple[GaussNewton, ...] = field(init=False)
+    tried: tuple[tuple[int, int], ...] = field(init=False)  # (p, q) of each
 
     def __post_init__(self):
         if not isinstance(self.largest, int) or not 0 <= self.largest <= 10:
@@ -47,6 +48,7 @@ class OrderBank:
         more: dict = THESIS if self.printed else {}
         members = tuple(GaussNewton(self.settings, p, q, self.forgetting, self.memory, **more) for p, q in orders)
         object.__setattr__(self, "members", members)
+        object.__setattr__(self, "tried", tuple(orders))
 
     @property
     def regressor_errors(self) -> bool:
@@ -74,7 +76,7 @@ class OrderBank:
             updates.append(update)
         state = OrderBankState(tuple(states), seen, squares, state.chosen)
         chosen = int(np.argmin(self.criteria(state).sum(axis=1)))
-        p, q = self.members[chosen].p, self.members[chosen].q
+        p, q = self.tried[chosen]
         events = updates[chosen].events
         if chosen != state.chosen:
             events += (Event("orders", "noise model", float(10 * p + q), f"noise model: p {p}, q {q}"),)
@@ -86,9 +88,9 @@ class OrderBank:
         """(members, q) the criterion of each member for each equation; smaller is better."""
         n = np.maximum(state.seen - SETTLING, 1.0)
         penalty = np.full_like(n, 2.0) if self.aic else np.log(n)
-        order = np.array([member.p + member.q for member in self.members])
+        order = np.sum(self.tried, axis=1)
         return n * np.log(np.maximum(state.squares / n, 1e-300)) + np.outer(order, penalty)
 
     def orders(self, state: OrderBankState) -> list[tuple[int, int]]:
         """The best (p, q) of each equation on its own."""
-        return [(self.members[k].p, self.members[k].q) for k in np.argmin(self.criteria(state), axis=0)]
+        return [self.tried[k] for k in np.argmin(self.criteria(state), axis=0)]

@@ -20,6 +20,7 @@ Left out, because no method could name them from what is recorded:
 """
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from ..scenario import signals_of
 from ..sensors import Sensor
 from ..system import Motion
 from .outside import OUTSIDE, nearest_inside
-from .specimen import COARSE_RATE, COARSE_STEP, SPEEDS, Peaks, Specimen, peaks_of
+from .specimen import COARSE_RATE, COARSE_STEP, SPEEDS, Peaks, Specimen, carrier_of, peaks_of
 
 CARRIES, MOVES, UNLOADS = 0.15, 0.010, 0.5
 """Share of the largest peak force; m; share of the peak force that is gone at the end."""
@@ -159,8 +160,12 @@ def _bent(specimen: Specimen) -> Iterator[Specimen]:
         shapes = [x / np.abs(x).max()] if free == "constant" else list(np.eye(FOLDS + 1))
         for shape in shapes:
             push = Curve(x, PUSH * peak * shape)
-            laws = (*element.spring.parallel, lambda crush, rate, push=push: push(crush))
+            laws = (*carrier_of(element).parallel, partial(_of_crush, push))
             yield specimen.with_law(element.name, parallel=laws)
+
+
+def _of_crush(push: Curve, crush: float, rate: float) -> float:
+    return push(crush)
 
 
 def _driving(specimen: Specimen, channel: str) -> Sensor | None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -46,7 +46,7 @@ class Specimen:
         return stiffness["shape"] if isinstance(stiffness, Mapping) else "known"
 
     def with_law(self, name: str, **changes: Any) -> "Specimen":
-        law = replace(self.element(name).spring, **changes)
+        law = replace(carrier_of(self.element(name)), **changes)
         return self.with_parts(elements=[
             replace(e, spring=law) if e.name == name else e for e in self.scenario.system.elements
         ])  # fmt: skip
@@ -70,6 +70,11 @@ class Specimen:
             old.system, bodies=tuple(bodies or old.system.bodies), elements=tuple(elements or old.system.elements)
         )
         return replace(self, scenario=replace(old, system=system, sensors=tuple(sensors or old.sensors)))
+
+
+def carrier_of(element: Element) -> Carrier:
+    """What an element of a specimen carries by: never another law."""
+    return cast(Carrier, element.spring)
 
 
 @dataclass(frozen=True)
@@ -109,7 +114,7 @@ def peaks_of(specimen: Specimen) -> Peaks:
 
 def model_element(element: Element, told: str, initial: float) -> dict[str, Any]:
     """An element's entry of the model file; what is told of its stiffness is "known", "constant" or "curve"."""
-    law: Carrier = element.spring
+    law = carrier_of(element)
     known = float(law.curve(1.0)) if told == "known" else None
     entry: dict[str, Any] = {
         "between": list(element.between),

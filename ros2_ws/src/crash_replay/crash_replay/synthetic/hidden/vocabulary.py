@@ -17,7 +17,7 @@ from ..sensors import accelerometer
 from ..system import Body, Element
 from . import laws
 from .curves import steepest, straight
-from .specimen import Peaks, Specimen
+from .specimen import Peaks, Specimen, carrier_of
 
 STOPPED = 60.0
 """rad/s, of an unmodelled body against its stop: some 60 g at 10 m/s, as an engine at the barrier."""
@@ -199,7 +199,7 @@ VOCABULARY: Mapping[str, Hide] = {
 
 
 def _parallel(specimen: Specimen, target: str, law: laws.Parallel) -> Specimen:
-    return specimen.with_law(target, parallel=(*specimen.element(target).spring.parallel, law))
+    return specimen.with_law(target, parallel=(*carrier_of(specimen.element(target)).parallel, law))
 
 
 def _distorted(specimen: Specimen, channel: str, distortion) -> Specimen:

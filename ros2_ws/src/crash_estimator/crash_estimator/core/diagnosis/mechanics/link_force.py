@@ -13,7 +13,7 @@ damper never pulls carries nothing where F is negative though S is not. What z r
 """
 
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -124,7 +124,7 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
         motion = ElementMotion(time, x, rate, peak, static)
         for term in link.parallel:
             c = theta[term.coefficient]
-            f = term.addition.effect.force(motion, **term.shapes_at(theta))
+            f = _physics(term).force(motion, **term.shapes_at(theta))
             beside = crushed if link.outlasts(term.addition.effect) else contact
             parameters.append(term.coefficient)
             columns.append(beside.gate * f)
@@ -178,10 +178,15 @@ def _law(link: Link, theta: np.ndarray) -> Law:
     return law
 
 
+def _physics(term: Term) -> Any:
+    """Its effect, with the function that those of its kind have: `force`, `memory` or `factor`."""
+    return term.addition.effect
+
+
 def _inside(term: Term, theta: np.ndarray, at: np.ndarray) -> _Inside:
     nothing, c = np.zeros_like(at), theta[term.coefficient]
     motion = ElementMotion(nothing, at, nothing, at, nothing)
-    f = term.addition.effect.force(motion, **term.shapes_at(theta))
+    f = _physics(term).force(motion, **term.shapes_at(theta))
     slope, _, by_shape = _slopes(term, theta, motion)
     parameters = [term.coefficient, *term.shapes.values()]
     return _Inside(c * f, c * slope, parameters, [f, *(c * each for each in by_shape)])
@@ -190,7 +195,7 @@ def _inside(term: Term, theta: np.ndarray, at: np.ndarray) -> _Inside:
 def _remembered(term: Term, link: Link, theta, time, x, beside: _Beside, parameters, columns) -> Memory:
     """c z is added to the forces beside the spring, derivatives are appended -> its memory."""
     c, shapes = theta[term.coefficient], term.shapes_at(theta)
-    memory = partial(term.addition.effect.memory, np.concatenate([time[:1], time]), form=term.addition.variant)
+    memory = partial(_physics(term).memory, np.concatenate([time[:1], time]), form=term.addition.variant)
     crush = np.concatenate([[0.0], x if link.tension else np.maximum(x, 0.0)])
     z, kept, by_crush, by_before = (each[1:] for each in memory(crush, 0.0, **shapes))
     parameters += [term.coefficient, *term.shapes.values()]
@@ -205,7 +210,7 @@ def _remembered(term: Term, link: Link, theta, time, x, beside: _Beside, paramet
 
 def _slopes(term: Term, theta: np.ndarray, motion: ElementMotion):
     """Of an effect's force, by crush and rate, and its derivatives by the logarithm of each shape constant."""
-    effect, shapes = term.addition.effect, term.shapes_at(theta)
+    effect, shapes = _physics(term), term.shapes_at(theta)
 
     def shifted(sign):
         return effect.force(motion._replace(crush=motion.crush + sign * SMALL_CRUSH), **shapes)
@@ -220,7 +225,7 @@ def _slopes(term: Term, theta: np.ndarray, motion: ElementMotion):
 
 def _factor(term: Term, theta: np.ndarray, rate: np.ndarray):
     """h, dh/dV, and its derivatives by the logarithm of each shape constant."""
-    effect, shapes = term.addition.effect, term.shapes_at(theta)
+    effect, shapes = _physics(term), term.shapes_at(theta)
     up, down = (effect.factor(rate + step, **shapes) for step in (FACTOR_RATE, -FACTOR_RATE))
     by_shape = term.by_shapes(theta, lambda **shapes: effect.factor(rate, **shapes))
     return effect.factor(rate, **shapes), (up - down) / (2.0 * FACTOR_RATE), by_shape

@@ -12,7 +12,7 @@ class Experiment(NamedTuple):
 
     layout: Layout
     record: ObservedRecord
-    index: int  # among the layout's recordings
+    index: int  # type: ignore[assignment]  # among the layout's recordings; hides the tuple's own method
 
 
 def experiments_of(layout: Layout, records: Sequence[ObservedRecord]) -> tuple[Experiment, ...]:

@@ -65,7 +65,7 @@ def band_test(residuals, noise_samples, periods) -> BandTest:
             power, bands = power_in_bands(z[np.isfinite(z)], period, EDGES)
             for low, high, inside in bands:
                 ratio = float(power[inside].mean())
-                p = probability_of(np.count_nonzero(inside), samples[q], ratio)
+                p = probability_of(int(np.count_nonzero(inside)), samples[q], ratio)
                 found.append((p, Band(r, q, low, min(high, 0.5 / period), ratio)))
     return _worst_of(found)
 
@@ -83,7 +83,7 @@ def band_test_of_fit(records: Sequence[Sequence[Absorbed]], noise_samples) -> Ba
             power, bands = power_in_bands(one.residual, one.period, ABSORBING)
             root = dct(one.root, norm="ortho", axis=0)
             for low, high, inside in bands:
-                covariance = np.eye(np.count_nonzero(inside)) - root[inside] @ root[inside].T
+                covariance = np.eye(int(np.count_nonzero(inside))) - root[inside] @ root[inside].T
                 mean, square = float(np.trace(covariance)), float((covariance**2).sum())
                 if mean < LEAST_LEFT:
                     continue

@@ -96,7 +96,7 @@ def _statistic(score: np.ndarray, information: np.ndarray) -> tuple[float, int]:
     """u' S^-1 u and its degrees of freedom: of directions that the model's parameters leave."""
     values, vectors = np.linalg.eigh(information)
     told = values > TOLD
-    return float(((vectors.T @ score)[told] ** 2 / values[told]).sum()), max(np.count_nonzero(told), 1)
+    return float(((vectors.T @ score)[told] ** 2 / values[told]).sum()), max(int(np.count_nonzero(told)), 1)
 
 
 @may_diverge

@@ -91,7 +91,7 @@ def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: 
         return {one: promise for one, promise in nats.items() if promise > -np.inf}
 
     tried: list[Structure] = []  # under which all has been looked for
-    untried = [never_pulling, elastic_when_spent, all_when_spent]
+    untried: list[Callable[[Structure], Structure]] = [never_pulling, elastic_when_spent, all_when_spent]
     path = _as_exact_as_needed(structure, records, effects, elsewhere=lambda begun: bool(promised(begun)))
     tried += [structure] if path.whole else []
     while untried and not out_of_time() and (others := promised(path)):
