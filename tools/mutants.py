@@ -17,7 +17,7 @@ import json
 import re
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -145,14 +145,18 @@ class Verdict(NamedTuple):
     by: str  # the test that caught it, or nothing
 
 
-def judge(mutants: list[Mutant], minutes: float) -> list[Verdict]:
-    """Two at once until the time is up; what was caught by a test that fails on the code as it is, is left out."""
+def judge(mutants: list[Mutant], minutes: float, keep: Callable[[list[Verdict]], object]) -> list[Verdict]:
+    """Two at once until the time is up; what was caught by a test that fails on the code as it is, is left out.
+
+    keep: is given the verdicts so far, each time that there is one more.
+    """
     global _known, _end
     _known, verdicts = mutant_judges.known_tests(), []
     start = time.monotonic()
     _end = start + 60.0 * minutes
     for verdict in filter(None, shared_out(_verdict, mutants)):
         verdicts.append(verdict)
+        keep(verdicts)
         mutant, by = verdict
         said = f"{mutant.path.name}:{mutant.line} {f'caught by {by}' if by else 'SURVIVED'}"
         print(f"{len(verdicts)}/{len(mutants)} {said}, {(time.monotonic() - start) / 60.0:.1f} min", flush=True)
@@ -238,19 +242,26 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="", help="part of a path, such as core/estimators")
     parser.add_argument("--minutes", type=float, default=60.0, help="no new one is begun after them")
-    parser.add_argument("--again", action="store_true", help="judge those that the last run of this seed did not catch")
+    parser.add_argument(
+        "--again", action="store_true", help="judge those that the last run of this seed did not catch, or not come to"
+    )
     parser.add_argument("--at-once", type=int, default=mutant_runs.AT_ONCE, help="processes that judge")
     given = parser.parse_args()
     mutant_runs.AT_ONCE = given.at_once
     mutants, kept = drawn(given.mutants, given.seed, given.only), KEPT / f"seed{given.seed}.json"
     before = dict(json.loads(kept.read_text())) if given.again else {}
     asked = [mutant for mutant in mutants if not before.get(_name(mutant))]
-    asked = asked[:: -1 if given.again else 1]  # the run before may not have come to the last ones
-    verdicts = judge(sorted(asked, key=lambda mutant: _name(mutant) in before), given.minutes)
-    judged = {_name(mutant) for mutant, _ in verdicts}
-    again = [mutant for mutant in mutants if _name(mutant) in before and _name(mutant) not in judged]
-    verdicts += [Verdict(mutant, before[_name(mutant)]) for mutant in again]  # that stands
-    kept.write_text(json.dumps([(_name(mutant), by) for mutant, by in verdicts]))
+
+    def keep(verdicts: list[Verdict]) -> list[Verdict]:
+        """To go on from with --again, also where this is ended -> the verdicts, and those before that stand."""
+        judged = {_name(mutant) for mutant, _ in verdicts}
+        again = [mutant for mutant in mutants if _name(mutant) in before and _name(mutant) not in judged]
+        verdicts = verdicts + [Verdict(mutant, before[_name(mutant)]) for mutant in again]
+        kept.write_text(json.dumps([(_name(mutant), by) for mutant, by in verdicts]))
+        return verdicts
+
+    asked.sort(key=lambda mutant: _name(mutant) in before)  # first those that the run before has not come to
+    verdicts = keep(judge(asked, given.minutes, keep))
     target = ROOT / "docs" / "mutants.md"
     target.write_text(page(section(verdicts, given.seed, given.mutants), target.read_text()))
     print(f"docs/mutants.md: {sum(bool(v.by) for v in verdicts)} of {len(verdicts)} caught")
