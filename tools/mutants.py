@@ -44,10 +44,15 @@ FACTS = re.compile(r"readers/(units|dates|nhtsa_uds|codes/\w+)\.py|core/(rating|
 
 EQUAL = {
     "names.sign / (-1.0": "by 1 or -1 it is all the same",
+    "values / signs": "by 1 or -1 it is all the same",
     "sign <= 0": "a sign is 1 or -1",
+    "turn <= 0": "a sign is 1 or -1",
     "else at - 4": "there stands the upper half of the first sample's number, which is 0: no test has 2^32",
     "reshape(n, -2)": "numpy takes every number below 0 for the open one",
+    "reshape(samples, -2)": "numpy takes every number below 0 for the open one",
     "self.run > 0 else 0": "of run 0 it is 0 either way",
+    "0.0 / more": "all of it are ones",
+    "most_common(2)[0]": "the first of two is the first",
 }
 """What a mutant has that its line has not, and why it provably changes nothing; it counts as not caught."""
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from crash_estimator.core.actions import Actions
+from crash_estimator.core.actions import Actions, _adds_mass, beside_the_springs
+from crash_estimator.core.contact import SpringLaw
 from crash_estimator.core.kinematics import Motion
 
 THETA = np.array([3.0, -2.0, 0.1])
@@ -80,3 +81,51 @@ def test_the_motion_without_a_channel_s_error_is_integrated_from_what_it_should_
         assert_allclose(by[:, 0], slope, rtol=1e-6, atol=1e-12)
     before = motion_of(recorded_a)._replace(time=-0.01)
     assert corrected(kind, share, error, -0.01, before, (x0, v0)).displacement is before.displacement
+
+
+@pytest.mark.parametrize("carries", [True, False])
+def test_a_force_beside_a_spring_acts_where_the_element_carries(carries):
+    action = SimpleNamespace(kind="element", at=0, element=0, in_curve=False, force=lambda motion: 7.0 * motion.rate)
+    actions = SimpleNamespace(actions=[action], ends=np.array([[0, 1]]), outlasts=[False])
+    none = np.zeros(1)
+    law = SpringLaw(none, none, np.array([carries]), np.array([True]), np.array([False]), none, none)
+    motion = SimpleNamespace(time=0.01, crush=np.array([0.1]), rate=np.array([2.0]))
+    assert Actions.forces(actions, motion, law, none) == [[14.0 if carries else 0.0]]
+
+
+def test_a_mass_that_an_estimate_would_take_away_leaves_a_twentieth():
+    """Of 10 kg, of which 12 are taken: 0.5 kg are left, and the same force moves them twenty times as much."""
+    mass = SimpleNamespace(kind="mass", at=0, coefficient=SimpleNamespace(estimated=True))
+    actions = SimpleNamespace(actions=[mass], first=1, mass=[10.0])
+    gradient = np.array([3.0, 0.0])
+    for change, factor in ((-12.0, 20.0), (-5.0, 2.0), (10.0, 0.5)):
+        found = Actions._heavier(actions, 0, 4.0, gradient.copy(), np.array([2.0, change]))
+        assert found[1] == pytest.approx(factor)
+
+
+@pytest.mark.parametrize(
+    ("kind", "body", "lighter", "estimated", "share"),
+    [
+        ("mass", 1, -1, True, 1.0),
+        ("mass", 0, -1, True, 0.0),
+        ("inertia", 0, 1, True, -1.0),
+        ("offset", 1, -1, True, 0.0),
+        ("mass", 1, -1, False, 0.0),
+    ],
+)
+def test_what_a_coefficient_adds_to_a_body_s_mass(kind, body, lighter, estimated, share):
+    action = SimpleNamespace(kind=kind, at=body, lighter=lighter, coefficient=SimpleNamespace(estimated=estimated))
+    assert _adds_mass(action, 1) == share
+
+
+def test_forces_beside_a_spring_add_up_and_factors_multiply():
+    def action(kind, value, element=0):
+        return SimpleNamespace(kind=kind, at=element, in_curve=False, force=lambda motion: np.full(3, value))
+
+    actions = [action("element", 5.0), action("element", 7.0, element=1), action("factor", 0.5), action("memory", 0.0)]
+    structure = SimpleNamespace(elements=[SimpleNamespace(factor=None)] * 2, actions=actions)
+    motion = SimpleNamespace(crush=np.ones(3), rate=np.ones(3))
+    remembered = np.array([0.0, 0.0, 0.0, 0.25])
+    parallel, factor = beside_the_springs(structure, np.array([2.0, 3.0, 4.0, 8.0]), 0, motion, remembered)
+    assert_allclose(parallel, 2.0 * 5.0 + 8.0 * 0.25)
+    assert_allclose(factor, 1.0 + 4.0 * 0.5)

@@ -7,7 +7,7 @@ import pytest
 from helpers_estimation import ESTIMATED, oscillator, oscillator_recording
 from numpy.testing import assert_allclose, assert_array_equal
 
-from crash_estimator.core.characteristic import characteristics
+from crash_estimator.core.characteristic import _unloading, characteristics
 from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.core.structure import Coefficient
@@ -39,3 +39,13 @@ def test_an_element_that_was_never_crushed_has_no_force_over_a_meter():
     (found,) = characteristics(oscillator(), estimator.description, run(estimator, recording.samples()))
     assert_array_equal(found.crush, [0.0, 1.0])
     assert_array_equal(found.force, [0.0, 0.0])
+
+
+@pytest.mark.parametrize(("known", "estimated"), [(4e6, True), (4e6, False), (None, False)])
+def test_an_unloading_line_that_is_known_or_of_a_known_spring_is_not_sought(known, estimated):
+    """Though the force comes back on a line ten times as steep as it went up."""
+    element = replace(oscillator().elements[0], unloading=known, stiffness=Coefficient(1e5, estimated=estimated))
+    crush = np.concatenate([np.linspace(0.0, 0.1, 100), np.linspace(0.099, 0.091, 20)])
+    force = np.where(np.arange(120) < 100, 1e5 * crush, 1e4 - 1e6 * (0.1 - crush))
+    assert _unloading(element, crush, force) == known
+    assert _unloading(replace(element, unloading=None, stiffness=Coefficient(1e5, True)), crush, force) > 5e5

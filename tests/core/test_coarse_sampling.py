@@ -30,7 +30,7 @@ def test_a_stiff_spring_sampled_coarsely_keeps_its_motion():
     estimates = run(estimator, Recording(test, time_ns, a[:, None]).samples())
     given = (Characteristic("spring", np.array([-1.0, 0.0, 1.0]), np.array([-k, 0.0, k]), None, 0.0, True),)
     found = free_run(structure, estimator.description, estimates, given)
-    assert_allclose(found.velocity[:, 0], 5.0 * np.cos(w * found.time), atol=5e-3)
+    assert_allclose(found.velocity[:, 0], 5.0 * np.cos(w * found.time), atol=1e-3)
 
 
 @pytest.mark.parametrize(("moved", "made", "settled"), [((), 1, False), ((0.5,), 2, False), ((0.5, 0.01), 3, True)])
@@ -38,3 +38,24 @@ def test_passes_are_counted_as_they_were_made(moved, made, settled):
     passes = Passes(None, [], moved)
     assert passes.as_json() == {"made": made, "moved": moved, "settled": settled}
     assert passes.text.startswith("one pass" if made == 1 else f"{made} passes")
+
+
+def test_a_force_on_a_free_body_is_taken_where_each_step_is():
+    """A mass that a force 400 sin(w t) pushes, sampled ten times a period: v = 400 / (m w) (1 - cos w t)."""
+    w, mass = 2.0 * np.pi * 100.0, 10.0
+    time_ns = np.arange(-20, 60, dtype=np.int64) * 1_000_000
+    t = np.maximum(time_ns * 1e-9, 0.0)
+    pushed = 400.0 * np.sin(w * t)
+    test = Test("pushed", (Channel("ax", "acceleration"), Channel("motor_fx", "force")))
+    structure = Structure(
+        "pushed",
+        (Body("axis", mass, ("ax",), applied="motor_fx"), Body("frame", fixed=True)),
+        (Element("guide", ("axis", "frame"), Coefficient(0.0), Coefficient(1.0, True)),),
+    )
+    recording = Recording(test, time_ns, np.column_stack([pushed / mass, pushed]))
+    estimator = make_estimator(structure, test, "kalman")
+    estimates = run(estimator, recording.samples())
+    given = (Characteristic("guide", np.array([-1.0, 1.0]), np.zeros(2), None, 0.0, True),)
+    found = free_run(structure, estimator.description, estimates, given, recording=recording)
+    expected = 400.0 / (mass * w) * (1.0 - np.cos(w * found.time))
+    assert_allclose(found.velocity[:, 0], expected, atol=2e-3)

@@ -68,3 +68,12 @@ def test_an_offset_counts_from_time_zero_on(form):
     found, _ = given([0.0, 0.1], [0.0, 0.0], [Offset(1, EFFECTS["channel_offset"], form, 4.0)])
     for k, seen in enumerate(found, -5):
         assert_allclose(seen.values, true(k * STEP), atol=1e-12)
+
+
+def test_channels_that_are_late_by_different_times_are_of_the_same_instant():
+    late = np.array([6, 2]) * STEP
+    found, _ = given([0.0, 0.0], late * 1e-9)
+    for k, seen in enumerate(found[8:], 3):
+        assert seen.given_ns == k * STEP - late[0]
+        if seen.given_ns >= 0:  # what was recorded before the first sample is not known
+            assert_allclose(seen.values, true(k * STEP - late[0]), atol=1e-12)

@@ -8,8 +8,10 @@ from helpers_paths import DATA
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.core.estimators.effective_mass import with_effective_masses
+from crash_estimator.core.estimators.window import mean_of, widened
 from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
+from crash_estimator.core.regression import Regression
 from crash_estimator.core.structure import ModelError
 from crash_estimator.model_file import load_model
 from crash_replay.recording import Channel, Recording, Test
@@ -124,3 +126,31 @@ def test_it_conforms():
         state, estimate = estimator.step(state, sample)
         assert_array_equal(estimate.parameters, expected.parameters)
         assert_array_equal(estimate.covariance, estimate.covariance.T)
+
+
+@pytest.mark.parametrize(("interval", "updates"), [(0.002, 40), (0.008, 10), (0.0, 800)])
+def test_the_masses_are_told_once_an_interval(interval, updates):
+    """Of 80 ms after the impact."""
+    _, estimates = final(frontal(noise=5.0), "frontal_engine_cab", interval=interval)
+    masses = np.array([estimate.parameters for estimate in estimates])
+    assert np.count_nonzero((np.diff(masses, axis=0) != 0.0).any(axis=1)) == pytest.approx(updates, abs=1)
+
+
+def test_an_equation_without_a_valid_sample_has_no_mean():
+    """And dividing by nothing is not tried."""
+    errors, known = np.zeros(2), np.array([2.0, 3.0])
+    values = np.array([10.0, np.nan])
+    one = Regression(errors, np.eye(2), values, np.ones(2, bool), errors, known, 1e-4, 0.01)
+    with np.errstate(all="raise"):
+        mean = mean_of(widened(widened(None, one), one), one)
+    assert_array_equal(mean.measured, values)
+    assert_array_equal(mean.gradient, [[1.0, 0.0], [0.0, 0.0]])
+    assert_allclose(mean.noise, [1.0, 1.0])
+
+
+def test_a_residual_is_what_the_masses_after_the_sample_leave():
+    recording = frontal(noise=5.0, n=60)
+    _, estimates = final(recording, "frontal_engine_cab", interval=0.002)
+    last = estimates[-1]
+    assert_allclose(last.residual, last.measured - last.predicted)
+    assert_allclose(last.predicted, -last.parameters @ last.acceleration[: len(last.parameters)], rtol=1e-6)

@@ -1,6 +1,7 @@
 """Higher powers of crush and rate (equation 4.1), an estimated unloading slope, damping after stiffness (7.3)."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,8 +9,11 @@ from helpers_estimation import oscillator, oscillator_recording
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.core.estimate import ParameterStatus
+from crash_estimator.core.estimators.damping_later import DampingLater, LaterState
+from crash_estimator.core.estimators.update import Update
 from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
+from crash_estimator.core.regression import Further, Regression
 from crash_estimator.core.structure import Coefficient, Structure, Term
 from crash_estimator.model_file import load_model
 from crash_replay.recording import Recording, RecordingError
@@ -127,3 +131,27 @@ elements:
     path.write_text(text.replace("initial: 4.0e4, ", ""))
     with pytest.raises(RecordingError, match="`estimate: true` with an `initial` value above 0"):
         load_model(path)
+
+
+def test_a_secant_has_its_higher_powers_of_the_largest_crush():
+    """F = K x + K3 x^3 has the secant K + K3 x^2."""
+    further = SimpleNamespace(of_crush=np.array([False, True]), element=np.array([0, 0]), power=np.array([1, 3]))
+    found = Further.secant(further, np.array([1e5]), np.array([1e5, 4e6]), np.array([0.2]))
+    assert_allclose(found, 1e5 + 4e6 * 0.2**2)
+
+
+@pytest.mark.parametrize("waits", [True, False])
+def test_a_sample_that_tells_only_of_a_damping_that_waits_changes_nothing(waits):
+    settings = SimpleNamespace(names=("e.stiffness", "e.damping"))
+    given = []
+    update = Update(np.array([2.0, 3.0]), np.eye(2), np.eye(1), np.zeros(2, bool))
+    method = SimpleNamespace(
+        settings=settings, update=lambda inner, reduced: given.append(reduced) or ("after", update)
+    )
+    std = np.array([1.0, 1.0])
+    state = LaterState("before", np.array([False, waits]), np.array([2.0, 1.0]), std)
+    for psi, tells in (([0.0, 4.0], not waits), ([5.0, 4.0], True)):
+        regression = Regression(*np.zeros((1, 1)), np.array([psi]), np.array([7.0]), np.ones(2, bool), *np.ones((3, 1)))
+        after, _ = DampingLater(method, 0.1).update(state, regression)
+        assert after.inner == ("after" if tells else "before")
+    assert given[-1].gradient.tolist() == [[5.0, 0.0 if waits else 4.0]]

@@ -81,3 +81,11 @@ def test_it_is_refused_where_a_force_is_unknown():
     recording = SCENARIOS["side_dummy_unpadded"](3)[0]
     with pytest.raises(ModelError, match="effective mass needs every force and acceleration, but body .* is driven"):
         make_estimator(load_model("side_dummy"), recording.test, "mrls", effective_mass=True)
+
+
+def test_the_masses_are_said_beside_what_the_method_says(recording):
+    structure = load_model("frontal_engine_cab")
+    plain = make_estimator(structure, recording.test, "gauss_newton", p=1, q=0).description
+    staged = make_estimator(structure, recording.test, "gauss_newton", p=1, q=0, effective_mass=True).description
+    assert staged.extra == (*plain.extra, "cab.mass", "engine.mass")
+    assert staged.extra_units == (*plain.extra_units, "kg", "kg")

@@ -1,5 +1,7 @@
 """Integration of the measured motion, and the loading / unloading / apart logic of the elements."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -121,3 +123,34 @@ def test_newton_s_third_law_on_body_and_barrier():
     assert last.predicted[0] < 0 < last.predicted[1]
     assert_allclose(last.predicted[1], -1000.0 * last.predicted[0], rtol=1e-12)
     assert_allclose(last.force[0], last.predicted[1], rtol=1e-12)
+
+
+def test_the_rate_of_a_measured_crush_is_its_slope():
+    """A crush that is measured grows by 3 m/s, with no channel of its rate: the smoothed slope comes to that."""
+    structure = Structure(
+        "measured",
+        (Body("car", 1000.0, ("car_ax",)), Body("barrier", fixed=True, force="barrier_fx")),
+        (Element("front", ("car", "barrier"), Coefficient(1e5), displacement="front_dx"),),
+    )
+    channels = (*wall_test().channels, Channel("front_dx", "displacement", "car", "x"))
+    time_ns = np.arange(0, 200, dtype=np.int64) * 1_000_000
+    values = np.zeros((200, 3))
+    values[:, 2] = 0.05 + 3.0 * time_ns * 1e-9
+    found = motions(Recording(Test("measured", channels), time_ns, values), structure)
+    assert_allclose([found[-1].crush[0], found[-1].rate[0]], [values[-1, 2], 3.0], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("pulls", "expected"), [(True, ElementState.UNLOADING), (False, ElementState.APART)])
+def test_a_damper_that_never_pulls_leaves_the_element_apart_where_it_would(pulls, expected):
+    """At 0.1 m the spring pushes with 10 kN; coming back at 2 m/s a damper of 8 kN s/m would pull with 16 kN."""
+    structure = wall_structure(tension=False)
+    (element,) = structure.elements
+    contact = Contact(replace(structure, elements=(replace(element, damper_pulls=pulls),)))
+    kinematics = Kinematics(structure, wall_test())
+    _, motion = kinematics.step(kinematics.init(), Sample(0, 0, np.zeros(2)))
+    states, state = [], contact.init()
+    for rate in (2.0, -2.0):
+        at = motion._replace(crush=np.array([0.1]), rate=np.array([rate]))
+        state, _, _ = contact.step(state, at, np.array([1e5]), damping=np.array([8e3]))
+        states.append(ElementState(state.state[0]))
+    assert states == [ElementState.LOADING, expected]

@@ -8,7 +8,8 @@ from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
-from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.effects import EFFECTS, vented_gas
+from crash_estimator.core.effects.bouc_wen import trace
 
 HYSTERESIS = {"yield_crush": 0.02, "exponent": 2.0}
 
@@ -113,3 +114,32 @@ def test_a_tight_gas_cushion_is_an_adiabatic_spring_and_one_with_a_hole_loses_wh
 def test_a_gas_cushion_pressed_without_bounds_ends_at_once(far):
     y = cushion(np.array([0.0, 0.01, 0.02]), np.array([0.0, far, 0.0]), leak=25.0)[0]
     assert np.all((y >= 0.0) & (y <= 50.0**1.4) | np.isnan(y))
+
+
+@pytest.mark.parametrize("way", [0.0031, -0.0067, 0.093])
+@pytest.mark.parametrize("start", [0.0, 0.6, -0.8])
+def test_the_derivatives_of_hysteresis_are_those_of_its_force(way, start):
+    """By the crush at the end of a step, and by what was remembered at its beginning."""
+
+    def after(start, way):
+        return trace(np.array([0.0, way]), start, 0.02, 2.0, 0.3)[0][1]
+
+    _, by_before, by_crush = trace(np.array([0.0, way]), start, 0.02, 2.0, 0.3)
+    h = 1e-7
+    assert_allclose(by_crush[1], (after(start, way + h) - after(start, way - h)) / (2.0 * h), rtol=1e-4, atol=1e-4)
+    assert_allclose(by_before[1], (after(start + h, way) - after(start - h, way)) / (2.0 * h), rtol=1e-4, atol=1e-6)
+
+
+@pytest.mark.parametrize("before, now", [(0.05, 0.08), (0.12, 0.09), (-0.01, 0.03)])
+@pytest.mark.parametrize("start", [0.2, 1.5])
+def test_the_derivatives_of_a_gas_are_those_of_its_overpressure(before, now, start):
+    """By what it was, by the crush at the end of the step and, with the other sign, by the one at its beginning."""
+
+    def after(y=start, before=before, now=now):
+        return vented_gas.trace(np.array([0.0, 1e-3]), np.array([before, now]), y, 0.2, 30.0, 1.4)[0][1]
+
+    found = vented_gas.trace(np.array([0.0, 1e-3]), np.array([before, now]), start, 0.2, 30.0, 1.4)
+    h = 1e-6
+    slopes = [(after(**{k: v + h}) - after(**{k: v - h})) / (2.0 * h) for k, v in
+              (("y", start), ("now", now), ("before", before))]  # fmt: skip
+    assert_allclose([found[1][1], found[2][1], -found[3][1]], slopes, rtol=1e-6, atol=1e-9)

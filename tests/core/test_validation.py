@@ -1,5 +1,7 @@
 """Correlation limits hold for white noise, planted correlations are found, the free run closes the loop."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from helpers_estimation import oscillator, oscillator_recording
@@ -168,3 +170,16 @@ def test_the_table_of_a_comparison():
     description, estimates = estimated(structure, recording, "constrained_kalman")
     text = comparison_table(compare(structure, description, free_run(structure, description, estimates, end=0.1)))
     assert "car velocity" in text and "excellent" in text
+
+
+def test_the_correlation_of_equations_is_their_covariance_in_units_of_their_scatter():
+    description = SimpleNamespace(equations=("a",), equation_units=("m/s^2",), elements=())
+    structure = SimpleNamespace(force_to_equation=np.zeros((1, 0)))
+    values = 3.0 * np.random.default_rng(2).standard_normal(50)
+    estimates = [
+        SimpleNamespace(time_ns=k, residual=np.array([v]), measured=np.array([v]), predicted=np.zeros(1))
+        for k, v in enumerate(values)
+    ]
+    found = validate(structure, description, estimates)
+    assert_allclose(found.covariance, [[np.var(values, ddof=1)]])
+    assert_allclose(found.correlation, [[1.0]])

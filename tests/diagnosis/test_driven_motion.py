@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from crash_estimator.core.diagnosis.mechanics.driven_motion import driven_by, driven_motion
 from crash_estimator.core.diagnosis.mechanics.masses import attached_inertia
 from crash_estimator.core.diagnosis.observation.grid import DRIVEN_MODES, cosines_of
+from crash_estimator.core.diagnosis.observation.tracked_motion import tracked_acceleration
 from crash_estimator.core.diagnosis.observation.trajectory import element_motion
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.effects.effect import Addition
@@ -80,3 +81,18 @@ def test_an_element_is_crushed_by_what_its_first_end_goes_towards_its_second():
     assert_allclose(found.crush, 0.2 * np.sin(40.0 * TIME), atol=1e-15)
     assert_allclose(found.rate, v[:, 0] - v[:, 1])
     assert_allclose(found.peak, np.maximum.accumulate(found.crush))
+
+
+def test_the_acceleration_of_a_displacement_that_is_reached_anyway_is_its_own():
+    """x = x0 + v0 t + b t^3 / 6 is what a = b t integrates to: an observer has nothing to correct."""
+    time, x0, v0, b = np.arange(50) * 1e-3, 0.3, 2.0, 400.0
+
+    def displacement(t, n=0):
+        return (x0 + v0 * t + b * t**3 / 6.0, v0 + b * t**2 / 2.0, b * t)[n]
+
+    assert_allclose(tracked_acceleration(time, displacement, x0, v0), b * time, atol=1e-6)
+    off = tracked_acceleration(time, displacement, x0 + 1e-3, v0)
+    dt = 1e-3
+    v = v0 + np.concatenate([[0.0], np.cumsum(0.5 * dt * (off[1:] + off[:-1]))])
+    x = x0 + 1e-3 + np.concatenate([[0.0], np.cumsum(dt * v[:-1] + dt * dt * (2.0 * off[:-1] + off[1:]) / 6.0)])
+    assert abs(x[-1] - displacement(time[-1])) < 1e-5, "a start that is off by 1 mm is forgotten"

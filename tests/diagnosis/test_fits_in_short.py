@@ -1,5 +1,6 @@
 """How a fit ends, and what its residuals are counted by, on the short record of the oracles."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,17 +10,19 @@ from scipy.linalg import LinAlgError
 from test_diagnosis_oracles import problem_of, structure
 from test_diagnosis_oracles_in_short import short_record
 
-from crash_estimator.core.diagnosis.mechanics.linearization import _steps
+from crash_estimator.core.diagnosis.mechanics.linearization import _steps, linearise
+from crash_estimator.core.diagnosis.mechanics.outputs import output_noise
+from crash_estimator.core.diagnosis.observation.noise_inflation import with_inflated_noise
 from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.output_error import gauss_newton
 from crash_estimator.core.diagnosis.output_error.gauss_newton import fit
 from crash_estimator.core.diagnosis.output_error.problem import make_problem
 from crash_estimator.core.diagnosis.output_error.simulation import simulate
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
-from crash_estimator.core.diagnosis.residuals.residuals import analyse
+from crash_estimator.core.diagnosis.residuals.residuals import _absorbed, analyse
 from crash_estimator.core.effects.kinds.element_force import ElementForce
 from crash_estimator.core.structure import Coefficient, EffectSpec
-from crash_replay.recording import Recording
+from crash_replay.recording import Channel, Recording
 
 RATE = 2500.0
 """Hz: each sample is a bin."""
@@ -93,3 +96,47 @@ def test_a_force_of_the_crush_alone_is_sought_where_no_free_curve_contains_it(st
     element = SimpleNamespace(name="spring", stiffness=stiffness, unloading=unloading, unloads=unloading is not None)
     magnitudes = SimpleNamespace(crushed_elements=lambda: [element], element=lambda name: 0)
     assert bool(list(effect.candidates(SimpleNamespace(), magnitudes))) == sought
+
+
+@pytest.mark.parametrize("delay", [1.0e-4, 2.5e-4, 5.0e-4])
+def test_the_noise_of_a_measured_inertia_grows_with_its_mass_and_its_channel_s_delay(recording, delay):
+    """As its derivative says; a sample lasts 0.4 ms, of which a delay takes a part."""
+    channels = (*recording.test.channels, Channel("box_ax", "acceleration", "box", "x"))
+    values = np.column_stack([recording.values, 1.02 * recording.values[:, 1]])
+    with_box = Recording(replace(recording.test, channels=channels), recording.time_ns, values)
+    late = EffectSpec("channel_delay", "plate_ax", delay)
+    box = EffectSpec("unmodelled_body", "box_ax", 30.0, host="plate")
+    problem, _ = problem_of(structure(late, box), with_box)
+    (experiment,), theta = problem.experiments, problem.layout.start
+    growth = output_noise(experiment, theta).growth
+    assert {p for _, p, _ in growth} == {term.coefficient for term in problem.layout.terms}
+    for q, parameter, slope in growth:
+        step = 1e-4 * theta[parameter] * (np.arange(len(theta)) == parameter)
+        up, down = (np.log(output_noise(experiment, theta + s * step).std[q]) for s in (1.0, -1.0))
+        assert slope == pytest.approx((up - down) / (2.0 * step[parameter]), rel=1e-5)
+
+
+def test_what_a_fit_has_absorbed_is_looked_at_in_bins_of_its_record(recording):
+    problem, _ = problem_of(structure(EffectSpec("viscous_damping", "foam", 0.0)), recording)
+    fitted = fit(problem)
+    (experiment,) = problem.experiments
+    equations = linearise(experiment, fitted.theta, fitted.trajectories[0])
+    for one in _absorbed(fitted, experiment, equations):
+        assert len(one.residual) * one.period == pytest.approx(experiment.record.time[-1], rel=1e-9)
+
+
+def test_what_is_left_in_one_band_counts_as_noise_as_strong_as_it_is_there(recording):
+    """A cosine at 69 Hz in the first output's bins of 4 ms: of the 20 frequencies 10 lie with it, from 60 to 125 Hz."""
+    record, size = observe(structure(), recording), 30.0
+    nothing = np.zeros_like(record.measured)
+    (as_binned,) = with_inflated_noise([record], [nothing])
+    bins, at = as_binned.bins, as_binned.bin[record.at]
+    assert bins == 20
+    z = size * np.cos(np.pi * 11 * (np.arange(bins) + 0.5) / bins)
+    left = nothing.copy()
+    left[:, 0] = z[at] * record.noise[0] / np.sqrt(np.bincount(at, minlength=bins))[at]
+    (found,) = with_inflated_noise([record], [left])
+    variance = np.linalg.inv(found.whitener.T @ found.whitener)
+    assert_allclose(
+        variance, np.diag([1.0 + np.sum(z**2) / 10, 1.0, 1.0]), rtol=0.01, atol=1e-6
+    )  # the last bin is not full

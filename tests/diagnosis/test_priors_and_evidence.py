@@ -11,6 +11,7 @@ from crash_estimator.core.diagnosis.output_error.laplace_evidence import log_pri
 from crash_estimator.core.diagnosis.output_error.normal_equations import Normal
 from crash_estimator.core.diagnosis.parameterization.free_curve import ROUGHNESS, Curve, adapted_roughness
 from crash_estimator.core.diagnosis.parameterization.layout import _element_link, _modes
+from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.structure import Coefficient, Element
 
 
@@ -103,3 +104,16 @@ def test_a_spring_has_a_constant_only_where_it_is_unknown_and_no_curve(estimated
     builder = Builder()
     _element_link(builder, 0, element, {"car": 0, "wall": 1}, curve, magnitudes, (), [])
     assert builder.names == names
+
+
+@pytest.mark.parametrize(
+    ("tension", "lowest", "variants"),
+    [(True, -0.1, {"", "play"}), (True, 0.0, {""}), (False, -0.1, {""}), (False, 0.0, {""})],
+)
+def test_a_gap_to_both_sides_is_sought_of_an_element_that_can_pull_and_has_been_pulled(tension, lowest, variants):
+    element = SimpleNamespace(name="spring", tension=tension)
+    magnitudes = SimpleNamespace(
+        crushed_elements=lambda: [element], largest_crush=lambda name: 0.1, element=lambda name: 0,
+        crush_range=np.array([[lowest, 0.1]]),
+    )  # fmt: skip
+    assert {one.variant for one in EFFECTS["clearance"].candidates(None, magnitudes)} == variants

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from crash_estimator.core.diagnosis import THRESHOLDS
-from crash_estimator.core.diagnosis.selection import assumptions, forward_selection, pair_search
+from crash_estimator.core.diagnosis.online import candidate_turns
+from crash_estimator.core.diagnosis.selection import assumptions, fitted_model, forward_selection, pair_search
 from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
 from crash_estimator.core.diagnosis.selection.fitted_model import forces_jump
 from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
@@ -159,3 +160,37 @@ FALLS_TO_ZERO = dict(tension=False, parallel=(), remembering=(), damping=None, k
 def test_what_makes_a_force_jump_where_a_contact_ends(link, jumps):
     layout = SimpleNamespace(links=[SimpleNamespace(**FALLS_TO_ZERO | link)])
     assert bool(forces_jump(layout)) == jumps
+
+
+@pytest.mark.parametrize(("updates", "late", "tried"), [(1, False, 3), (1, True, 2), (0, False, 2), (0, True, 1)])
+def test_of_candidates_of_an_update_some_are_tried_whatever_time_they_take(monkeypatch, updates, late, tried):
+    """The leaders, or the first of them at every other update, and the one whose turn it is."""
+    made = []
+    monkeypatch.setattr(candidate_turns, "_screened", lambda *given: ())
+    monkeypatch.setattr(candidate_turns, "shortlist", lambda *given: [SimpleNamespace(addition=addition("friction"))])
+    monkeypatch.setattr(candidate_turns, "_variant", lambda magnitudes, addition, turn: addition)
+    monkeypatch.setattr(candidate_turns, "_tried", lambda s, m, b, addition, one: made.append(addition) or made[-1])
+    monkeypatch.setattr(candidate_turns, "as_found", lambda tried: tried)
+
+    def addition(name):
+        return SimpleNamespace(key=(name, "spring"), gain=5.0, fit=None, addition=SimpleNamespace(key=(name, "spring")))
+
+    leaders = addition("damping"), addition("gap")
+    gains = {leader.key: 5.0 for leader in leaders}
+    state = candidate_turns.OnlineState(updates, leaders, gains)
+    before = SimpleNamespace(additions=(), fit=None)
+    candidate_turns.try_some(state, None, {}, before, lambda: late)
+    assert len(made) == tried
+
+
+def test_where_a_slower_contact_is_likelier_it_is_judged_as_sharply(monkeypatch):
+    asked = []
+    first, slower = SimpleNamespace(evidence=1.0), SimpleNamespace(evidence=2.0)
+    monkeypatch.setattr(fitted_model, "forces_jump", lambda layout: True)
+    monkeypatch.setattr(fitted_model, "fit", lambda *given, **more: slower)
+    monkeypatch.setattr(fitted_model, "settled", lambda *given: True)
+    monkeypatch.setattr(fitted_model, "analyse", lambda fitted, sharply: asked.append((fitted, sharply)) or "judged")
+    problem = SimpleNamespace(layout=None)
+    given = SimpleNamespace(point=None, evidence=first.evidence), SimpleNamespace(white=False)
+    assert fitted_model._with_more_care(problem, *given) == (slower, "judged")
+    assert asked == [(slower, True)]

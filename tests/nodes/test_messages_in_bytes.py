@@ -67,3 +67,11 @@ def test_what_an_estimate_is_about_and_which_revision_says_it(frame, kind, sampl
         raw = serialize_message(message)
         assert about_of(raw, kind) == About(2, 77, samples)
         assert revision_of(raw, kind) == 5
+
+
+def test_an_estimate_from_a_machine_of_the_other_byte_order_is_deserialised():
+    """The head as CDR has it there; what comes after it is left to the middleware."""
+    body = struct.pack(">iI", 7, 250) + struct.pack(">I", 2) + b"a\0\0\0" + struct.pack(">I", 3)
+    body += b"\0" * (-len(body) % 8) + struct.pack(">Q", 1234) + struct.pack(">I", 2)
+    body += b"\0" * (-len(body) % 8) + struct.pack(">2q", 5, 6) + b"\0" * 80
+    assert about_of(b"\0\0\0\0" + body, ParametersBlock) == About(3, 1234, 2)

@@ -1,6 +1,7 @@
 """What nodes make of what they know, without a graph: each is asked what it does next."""
 
 import time
+from collections import deque
 from types import SimpleNamespace
 
 import numpy as np
@@ -283,3 +284,80 @@ def test_samples_that_all_came_before_are_answered_again():
     )  # fmt: skip
     Intake.receive(intake, 1, Rows(30, np.arange(10), np.zeros((10, 1))), 0)
     assert answered == [(1, 39)]
+
+
+@pytest.mark.parametrize(
+    ("word", "expected"),
+    [
+        ({"run": 1, "done": True}, True),
+        ({"run": 0, "done": True, "reason": "no test"}, True),
+        ({"run": 0, "done": True}, False),
+        ({"run": 1}, False),
+    ],
+)
+def test_all_is_expected_that_an_estimator_has_had_its_last_word_on(word, expected):
+    of, asked = attending(SimpleNamespace(run=1, first=3), **word), []
+    whole = WholeEstimates(Silence(), "e", of, lambda topic, raw: None)
+    for stream in whole.streams.values():
+        stream.expect = lambda *given: asked.append(given)
+    whole._expect_all_that_was_said()
+    assert asked == [(1, 3, of.others.word("e").next)] * len(whole.streams) * expected
+
+
+@pytest.mark.parametrize("waits", [True, False])
+def test_all_in_one_stays_till_the_others_have_all_they_want_or_the_time_is_up(monkeypatch, waits):
+    """Who is there and is not done asks the estimators again for what it lacks."""
+    looks = []
+    monkeypatch.setattr(composed.time, "sleep", looks.append)
+    others = SimpleNamespace(
+        names=lambda: ["viewer"], there=lambda name: True, word=lambda name: SimpleNamespace(done=len(looks) >= 3)
+    )
+    replay = SimpleNamespace(
+        topics=SimpleNamespace(audience=SimpleNamespace(attending=SimpleNamespace(others=others))),
+        asked={"finish_timeout": 1000.0 if waits else -1.0},
+        pacing=SimpleNamespace(stopped=False),
+    )
+    assert composed.hear_out(replay, []) == 0
+    assert len(looks) == (3 if waits else 0)
+
+
+@pytest.mark.parametrize(
+    ("counted", "estimators", "found", "subscribes"),
+    [(False, True, True, 1), (False, True, False, 0), (True, True, True, 0), (False, False, True, 0)],
+)
+def test_a_viewer_is_counted_once_it_hears_some_estimator_and_each_wholly(counted, estimators, found, subscribes):
+    made = []
+    node = SimpleNamespace(
+        replay_goes_on=False, counted="counted" if counted else None, heard_since=-1e9, _on_first_sample=None,
+        estimates={"e": SimpleNamespace(found=found)} if estimators else {},
+        create_subscription=lambda *given, **more: made.append(given) or "counted",
+        attending=SimpleNamespace(tell=lambda: None),
+    )  # fmt: skip
+    ViewerNode._be_counted(node)
+    assert len(made) == subscribes
+
+
+@pytest.mark.parametrize(
+    ("structure", "test", "known"), [("model", "test", True), (None, "test", False), ("model", None, False)]
+)
+def test_a_structure_is_drawn_where_both_the_model_and_the_test_are_known(monkeypatch, structure, test, known):
+    monkeypatch.setattr(viewer_node, "applied", lambda structure, test: "drawn")
+    node = SimpleNamespace(structure_named=lambda model: structure, test=test, estimates={})
+    assert (ViewerNode._structure_of(node, "e", 0, "model") == "drawn") == known
+
+
+@pytest.mark.parametrize(("number", "handed_out"), [(10, 3), (12, 5), (14, 5), (3, 0)])
+def test_of_samples_sent_again_those_of_the_pass_are_handed_out(number, handed_out):
+    """Five samples from `number` on, of a pass that begins with sample 12: those before it only are remembered."""
+
+    def rows(first, count):
+        return SimpleNamespace(time_ns=range(count), number=first, without=lambda n: rows(first + n, max(0, count - n)))
+
+    kept = []
+    head = SimpleNamespace(first=12, run=1, sent_again=0, without=False)
+    consumer = SimpleNamespace(keep=kept.append, stamp_of=lambda rows: 0)
+    node = SimpleNamespace(waiting=deque([head]), consumer=consumer, asked_again=0, _work=lambda: None)
+    Intake._on_asked(node, rows(number, 5))
+    before = [one for one in node.waiting if one is not head]
+    assert [len(one.arrival.rows.time_ns) for one in before] == [handed_out] * bool(handed_out)
+    assert head.sent_again == node.asked_again == len(kept[0].time_ns) == 5

@@ -5,14 +5,21 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_import_nhtsa import SENSORS, write_folder
+from helpers_ev5 import write_two_cars
+from pydantic import ValidationError
+from test_import_nhtsa import SENSORS, curve, write_folder
 
-from crash_replay.readers import body_means, isomme, nhtsa, read_source
+from crash_replay import limits
+from crash_replay.readers import body_means, is_bag, isomme, nhtsa, read_source
 from crash_replay.readers.codes.nhtsa import LOCATIONS
-from crash_replay.readers.csv_yaml import LONG, _check_time
-from crash_replay.readers.description import apply_names
-from crash_replay.readers.ev5 import _test_number
+from crash_replay.readers.csv_yaml import LONG, _check_header, _check_time
+from crash_replay.readers.description import RecordedChannel, apply_names
+from crash_replay.readers.ev5 import _angle, _test_number, read_header
 from crash_replay.readers.isomme import MmeFile
+from crash_replay.readers.isomme_velocity import _like_kmh
+from crash_replay.readers.left_out import ranges
+from crash_replay.readers.nhtsa_curves import _read_track
+from crash_replay.readers.uds import is_uds
 from crash_replay.recording import Channel, Recording, RecordingError, Test
 from crash_replay.sensor_agreement import Agreement
 
@@ -123,3 +130,102 @@ def test_a_time_is_as_long_as_from_its_first_sample_to_its_last():
         with pytest.raises(RecordingError, match="which is no crash"):
             _check_time(Path("t.csv"), time)
     _check_time(Path("t.csv"), np.arange(0.0, 0.9 * LONG, 1.0) + LONG)
+
+
+@pytest.mark.parametrize(("files", "bag"), [(["metadata.yaml"], True), (["a.mcap"], True), (["a.csv"], False)])
+def test_a_folder_is_a_bag_by_its_metadata_or_by_a_file_of_one(tmp_path, files, bag):
+    for name in files:
+        (tmp_path / name).touch()
+    assert is_bag(tmp_path) == bag
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_a_csv_file_may_have_as_many_channels_as_are_allowed(more):
+    names = [f"c{k}" for k in range(int(limits.CHANNELS.highest) + more)]
+    if more:
+        with pytest.raises(RecordingError, match=f"has {len(names)} "):
+            _check_header(Path("a.csv"), ["time", *names])
+    else:
+        _check_header(Path("a.csv"), ["time", *names])
+
+
+def test_the_header_of_ev5_says_who_made_the_test_and_how(tmp_path):
+    write_two_cars(tmp_path / "v1")
+    header = read_header(next((tmp_path / "v1").glob("*.EV5")))
+    said = (header.title, header.date, header.laboratory, header.configuration, header.closing_speed)
+    assert said == ("TWO CARS HEAD ON", "11/MAY/2012", "LAB", "VTV", 90.0)
+
+
+@pytest.mark.parametrize(("said", "kept"), [("", 1000), (": No valid data after 67 ms", 670)])
+def test_a_curve_is_read_as_far_as_it_is_valid(said, kept):
+    table = np.column_stack([np.arange(1000) * 1e-4, np.ones(1000)])
+    header = curve("SILL X" + said, first=0, last=999, status="CF" if said else "AM")
+    assert len(_read_track(header, "sill_ax", "car", lambda: ("a.001", table)).values) == kept
+
+
+@pytest.mark.parametrize(
+    ("text", "degrees"), [("90", 90.0), ("-90", -90.0), ("360", 360.0), ("999", 0.0), ("N/A", 0.0)]
+)
+def test_an_impact_angle_that_is_none_counts_as_head_on(text, degrees):
+    assert _angle(text) == degrees
+
+
+@pytest.mark.parametrize(
+    ("body", "moved", "like"),
+    [
+        ("car", ["car"], True),
+        ("head", ["head"], False),
+        ("car", ["barrier"], False),
+        ("object2_car", ["object2_car"], True),
+    ],
+)
+def test_a_speed_is_like_km_h_where_a_car_of_those_that_have_it_loses_as_much(body, moved, like):
+    """36 is stated, 10 m/s are lost; of a head nothing is said, nor of a car that stood."""
+    time = np.arange(1000) * 1e-4
+    columns = {Channel("ax", "acceleration", body, "x"): np.full(1000, -100.0)}
+    assert _like_kmh(36.0, moved, time, columns) == like
+
+
+@pytest.mark.parametrize(("mass", "masses"), [("1200", {1: 1200.0}), (None, {})])
+def test_a_vehicle_record_that_ends_before_the_mass_has_none(tmp_path, mass, masses):
+    write_two_cars(tmp_path / "v1")
+    (file,) = (tmp_path / "v1").glob("*.EV5")
+    lines = file.read_text(encoding="latin-1").splitlines()
+    at = next(k for k, line in enumerate(lines) if line.startswith("1|16|"))
+    fields = lines[at].split("|")[:10] + ([mass] if mass else [])
+    lines[at] = "|".join(fields)
+    file.write_text("\n".join(lines), encoding="latin-1")
+    assert {k: v for k, v in read_header(file).masses.items() if k == 1} == masses
+
+
+def test_a_file_that_cannot_be_read_is_no_uds_file(tmp_path):
+    assert not is_uds(tmp_path / "missing") and not is_uds(tmp_path)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_cells_of_a_barrier_are_added_up_and_pressed_by_what_hits_it(monkeypatch, side):
+    monkeypatch.setattr(isomme, "body_motion", lambda *given: SimpleNamespace(notes=[], columns={}, outliers=()))
+    cells = [Channel(f"cell{k}_fx", "force", "barrier", "x") for k in range(2)]
+    tracks = [SimpleNamespace(code="B0BARR0000000FOXP"[:16], channel=cell) for cell in cells]
+    values = side * np.array([[1.0, 2.0], [30.0, 10.0], [-3.0, 1.0]])
+    made, _ = isomme._made_of_several({}, tracks, cells, np.arange(3), values, notes := [])
+    (barrier,) = made.values()
+    assert barrier.tolist() == [3.0, 40.0, -2.0]
+    assert notes[0].endswith("sign as recorded" if side > 0 else "sign turned")
+
+
+def test_of_many_curves_that_are_left_out_the_first_ranges_are_listed_and_the_others_counted():
+    assert ranges([1, 2, 3, 7]) == "1-3, 7"
+    twelve = list(range(0, 24, 2))
+    assert ranges(twelve) == ", ".join(map(str, twelve))
+    shown = ", ".join(map(str, twelve[:11]))
+    assert ranges([*twelve, 30, 31, 32]) == f"{shown} and 4 more"
+
+
+@pytest.mark.parametrize(("sign", "valid"), [(1, True), (-1, True), (2, False), (0, False)])
+def test_a_sign_turns_a_channel_or_leaves_it(sign, valid):
+    if valid:
+        assert RecordedChannel(sign=sign).sign == sign
+    else:
+        with pytest.raises(ValidationError):
+            RecordedChannel(sign=sign)

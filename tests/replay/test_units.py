@@ -6,7 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from crash_replay.gravity import G
-from crash_replay.readers.units import FACTORS, quantity_of, si_factor
+from crash_replay.readers.units import FACTORS, POUND_MASS, quantity_of, si_factor
 
 INCH, POUND, MILE = 0.0254, 0.45359237, 1609.344  # m, kg, m: international yard and pound (1959)
 LBF = POUND * 9.80665  # N
@@ -48,3 +48,7 @@ def test_a_unit_is_what_it_is_defined_as(quantity):
         assert_allclose(si_factor(quantity, unit), factor, rtol=1e-12, err_msg=unit)
         assert quantity_of(unit) == quantity
     assert quantity_of("furlong") is None
+
+
+def test_a_pound_is_that_of_1959():
+    assert POUND_MASS == POUND
