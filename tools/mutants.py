@@ -51,7 +51,6 @@ EQUAL = {
     "reshape(n, -2)": "numpy takes every number below 0 for the open one",
     "reshape(samples, -2)": "numpy takes every number below 0 for the open one",
     "self.run > 0 else 0": "of run 0 it is 0 either way",
-    "0.0 / more": "all of it are ones",
     "most_common(2)[0]": "the first of two is the first",
 }
 """What a mutant has that its line has not, and why it provably changes nothing; it counts as not caught."""

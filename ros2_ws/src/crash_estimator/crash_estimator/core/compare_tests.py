@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 
 from crash_replay.recording import Recording, RecordingError
 
@@ -62,9 +63,9 @@ def curve_difference(a: Characteristic, b: Characteristic) -> float:
 
 def spectrum(model: NoiseModel, frequency: np.ndarray, dt: float) -> np.ndarray:
     """(n,) one-sided power density of the equation's error, unit^2/Hz, at frequencies in Hz below 1 / (2 dt)."""
-    delay = np.exp(-2j * np.pi * np.outer(frequency * dt, np.arange(max(len(model.a), len(model.d)) + 1)))
-    shape = [delay[:, : len(c) + 1] @ np.concatenate([[1.0], c]) for c in (model.a, model.d)]
-    return 2.0 * dt * model.variance * np.abs(shape[0] / shape[1]) ** 2
+    delay = np.exp(-2j * np.pi * frequency * dt)
+    a, d = (polyval(delay, [1.0, *c]) for c in (model.a, model.d))
+    return 2.0 * dt * model.variance * np.abs(a / d) ** 2
 
 
 def compare_noise_models(first: NoiseModel, second: NoiseModel, dt: float) -> NoiseDifference:

@@ -145,7 +145,6 @@ class GaussNewton:
             known=regression.known + linear + expected,
             gradient=filtered,
             active=np.concatenate([regression.active, np.ones(n - parameters, dtype=bool)]),
-            walk=np.concatenate([regression.walk, np.zeros(n - parameters)]),
             errors=self._passed_on(state, regression),
         )
         lag = followed(self.settings, state.lag, of_first(wide, state.rls.theta, parameters))
@@ -265,7 +264,7 @@ class GaussNewton:
         s, more = self.settings, np.ones(sum(p + q for p, q in self.orders(equations)))
         wide = Theta(
             s.names + ("",) * len(more),
-            np.concatenate([s.initial, 0.0 * more]),
+            np.concatenate([s.initial, np.zeros(len(more))]),
             np.concatenate([s.std, COEFFICIENT_STD * more]),
             np.concatenate([s.lower, -np.inf * more]),
             np.concatenate([s.upper, np.inf * more]),
