@@ -46,6 +46,26 @@ def final(recording, model, **settings):
     return estimator, run(estimator, recording.samples())
 
 
+def test_an_equation_without_a_valid_sample_has_no_mean():
+    """And dividing by nothing is not tried."""
+    errors, known = np.zeros(2), np.array([2.0, 3.0])
+    values = np.array([10.0, np.nan])
+    one = Regression(errors, np.eye(2), values, np.ones(2, bool), errors, known, 1e-4, 0.01)
+    with np.errstate(all="raise"):
+        mean = mean_of(widened(widened(None, one), one), one)
+    assert_array_equal(mean.measured, values)
+    assert_array_equal(mean.gradient, [[1.0, 0.0], [0.0, 0.0]])
+    assert_allclose(mean.noise, [1.0, 1.0])
+
+
+def test_a_residual_is_what_the_masses_after_the_sample_leave():
+    recording = frontal(noise=5.0, n=60)
+    _, estimates = final(recording, "frontal_engine_cab", interval=0.002)
+    last = estimates[-1]
+    assert_allclose(last.residual, last.measured - last.predicted)
+    assert_allclose(last.predicted, -last.parameters @ last.acceleration[: len(last.parameters)], rtol=1e-6)
+
+
 @pytest.mark.parametrize("settings", [{}, {"interval": 0}, {"interval": 0.002, "forgetting": 0.9}])
 def test_exact_from_exact_data(settings):
     _, estimates = final(frontal(), "frontal_engine_cab", **settings)
@@ -134,23 +154,3 @@ def test_the_masses_are_told_once_an_interval(interval, updates):
     _, estimates = final(frontal(noise=5.0), "frontal_engine_cab", interval=interval)
     masses = np.array([estimate.parameters for estimate in estimates])
     assert np.count_nonzero((np.diff(masses, axis=0) != 0.0).any(axis=1)) == pytest.approx(updates, abs=1)
-
-
-def test_an_equation_without_a_valid_sample_has_no_mean():
-    """And dividing by nothing is not tried."""
-    errors, known = np.zeros(2), np.array([2.0, 3.0])
-    values = np.array([10.0, np.nan])
-    one = Regression(errors, np.eye(2), values, np.ones(2, bool), errors, known, 1e-4, 0.01)
-    with np.errstate(all="raise"):
-        mean = mean_of(widened(widened(None, one), one), one)
-    assert_array_equal(mean.measured, values)
-    assert_array_equal(mean.gradient, [[1.0, 0.0], [0.0, 0.0]])
-    assert_allclose(mean.noise, [1.0, 1.0])
-
-
-def test_a_residual_is_what_the_masses_after_the_sample_leave():
-    recording = frontal(noise=5.0, n=60)
-    _, estimates = final(recording, "frontal_engine_cab", interval=0.002)
-    last = estimates[-1]
-    assert_allclose(last.residual, last.measured - last.predicted)
-    assert_allclose(last.predicted, -last.parameters @ last.acceleration[: len(last.parameters)], rtol=1e-6)

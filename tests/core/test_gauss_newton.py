@@ -32,6 +32,21 @@ def coloured(recording, d, a, sd, seed=1):
     return type(recording)(recording.test, recording.time_ns, values)
 
 
+def test_a_noise_model_that_is_given_is_used_from_the_first_sample_on():
+    """No word that it is learnt from some sample on: it was there before."""
+    test = oscillator_recording(n=2).test
+    given = (NoiseModel(np.array([-0.9]), np.zeros(0), np.array([[1e-4]]), 25.0),)
+    for start, begins in ((given, False), ((), True)):
+        method = make_estimator(oscillator(**BOTH), test, "gauss_newton", p=1, q=0).method
+        assert replace(method, start=start).init(1).learning.tolist() == [not begins]
+
+
+@pytest.mark.parametrize("largest", [-1, 11, 1.5])
+def test_a_bank_of_too_many_orders_is_refused(largest):
+    with pytest.raises(ModelError, match=f"must be from 0 to 10, got {largest}"):
+        make_estimator(oscillator(**BOTH), oscillator_recording().test, "gauss_newton_orders", largest=largest)
+
+
 @pytest.mark.parametrize("settings", [{}, {"forgetting": 0.97}, {"memory": 0.02}])
 def test_without_a_noise_model_it_is_rls_to_the_last_bit(settings):
     recording = oscillator_recording(noise=5.0)
@@ -197,18 +212,3 @@ def test_a_bank_of_one_order_is_that_estimator():
     for a, b in zip(run(bank, recording.samples()), run(alone, recording.samples())):
         assert_array_equal(a.parameters, b.parameters)
         assert_array_equal(a.covariance, b.covariance)
-
-
-def test_a_noise_model_that_is_given_is_used_from_the_first_sample_on():
-    """No word that it is learnt from some sample on: it was there before."""
-    test = oscillator_recording(n=2).test
-    given = (NoiseModel(np.array([-0.9]), np.zeros(0), np.array([[1e-4]]), 25.0),)
-    for start, begins in ((given, False), ((), True)):
-        method = make_estimator(oscillator(**BOTH), test, "gauss_newton", p=1, q=0).method
-        assert replace(method, start=start).init(1).learning.tolist() == [not begins]
-
-
-@pytest.mark.parametrize("largest", [-1, 11, 1.5])
-def test_a_bank_of_too_many_orders_is_refused(largest):
-    with pytest.raises(ModelError, match=f"must be from 0 to 10, got {largest}"):
-        make_estimator(oscillator(**BOTH), oscillator_recording().test, "gauss_newton_orders", largest=largest)

@@ -11,6 +11,7 @@ from crash_estimator.core.diagnosis.output_error.laplace_evidence import log_pri
 from crash_estimator.core.diagnosis.output_error.normal_equations import Normal
 from crash_estimator.core.diagnosis.parameterization.free_curve import ROUGHNESS, Curve, adapted_roughness
 from crash_estimator.core.diagnosis.parameterization.layout import _element_link, _modes
+from crash_estimator.core.diagnosis.parameterization.prior import Builder as PriorBuilder
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.structure import Coefficient, Element
 
@@ -117,3 +118,9 @@ def test_a_gap_to_both_sides_is_sought_of_an_element_that_can_pull_and_has_been_
         crush_range=np.array([[lowest, 0.1]]),
     )  # fmt: skip
     assert {one.variant for one in EFFECTS["clearance"].candidates(None, magnitudes)} == variants
+
+
+def test_a_curve_s_force_at_no_crush_is_no_parameter():
+    """Its column there is -1, as everywhere where there is none."""
+    curve = PriorBuilder().curve("spring", np.array([-0.1, 0.0, 0.1]), 0.1, 1e4, 1.0)
+    assert curve.column.tolist() == [0, -1, 1]

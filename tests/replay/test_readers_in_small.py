@@ -6,14 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers_ev5 import write_two_cars
-from pydantic import ValidationError
 from test_import_nhtsa import SENSORS, curve, write_folder
 
 from crash_replay import limits
 from crash_replay.readers import body_means, is_bag, isomme, nhtsa, read_source
 from crash_replay.readers.codes.nhtsa import LOCATIONS
 from crash_replay.readers.csv_yaml import LONG, _check_header, _check_time
-from crash_replay.readers.description import RecordedChannel, apply_names
+from crash_replay.readers.description import apply_names
 from crash_replay.readers.ev5 import _angle, _test_number, read_header
 from crash_replay.readers.isomme import MmeFile
 from crash_replay.readers.isomme_velocity import _like_kmh
@@ -222,10 +221,13 @@ def test_of_many_curves_that_are_left_out_the_first_ranges_are_listed_and_the_ot
     assert ranges([*twelve, 30, 31, 32]) == f"{shown} and 4 more"
 
 
-@pytest.mark.parametrize(("sign", "valid"), [(1, True), (-1, True), (2, False), (0, False)])
-def test_a_sign_turns_a_channel_or_leaves_it(sign, valid):
-    if valid:
-        assert RecordedChannel(sign=sign).sign == sign
+@pytest.mark.parametrize(("sign", "turned"), [(1, False), (-1, True), (2, None), (0, None)])
+def test_a_sign_turns_a_channel_or_leaves_it(tmp_path, sign, turned):
+    recording = Recording(Test("one", (Channel("a", "acceleration"),)), np.arange(2) * 1000, np.array([[1.0], [3.0]]))
+    file = tmp_path / "names.yaml"
+    file.write_text(f"channels: {{a: {{sign: {sign}}}}}\n")
+    if turned is None:
+        with pytest.raises(RecordingError, match=r"channels\.a\.sign"):
+            apply_names(recording, file)
     else:
-        with pytest.raises(ValidationError):
-            RecordedChannel(sign=sign)
+        assert apply_names(recording, file).values.tolist() == ([[-1.0], [-3.0]] if turned else [[1.0], [3.0]])
