@@ -3,11 +3,11 @@
 A mutant is the code with one operator, condition or number changed. First the tests are run once on the code as it is,
 to learn which executes which line, and how long it takes; those that take long, or fail, judge nothing, and what a test
 starts in another process is not seen. A mutant is then judged by the tests that execute its line, quickest first; the
-first that fails, or takes ten times as long and 10 s more, has caught it. A line that is executed at import alone, as a
-constant's, is judged by the tests that execute a line with its name, then by those of its file. What is not caught
-within a time counts as not caught. At the end each test that has caught one must pass on the code as it is; where it
-does not, what it has caught counts as not judged. What numba compiles, and where that takes its constants from, runs as
-Python (NUMBA_DISABLE_JIT): so its lines are seen, and nothing is compiled anew or found in a cache.
+first that fails, or takes ten times as long and 10 s more, has caught it, unless it does so on the code as it is, too,
+run after the same tests. A line that is executed at import alone, as a constant's, is judged by the tests that execute
+a line with its name, then by those of its file. What is not caught within a time counts as not caught. What numba
+compiles, and where that takes its constants from, runs as Python (NUMBA_DISABLE_JIT): so its lines are seen, and
+nothing is compiled anew or found in a cache.
 """
 
 import argparse
@@ -150,7 +150,7 @@ class Verdict(NamedTuple):
 
 
 def judge(mutants: list[Mutant], minutes: float, keep: Callable[[list[Verdict]], object]) -> list[Verdict]:
-    """Two at once until the time is up; what was caught by a test that fails on the code as it is, is left out.
+    """Two at once until the time is up.
 
     keep: is given the verdicts so far, each time that there is one more.
     """
@@ -164,12 +164,7 @@ def judge(mutants: list[Mutant], minutes: float, keep: Callable[[list[Verdict]],
         mutant, by = verdict
         said = f"{mutant.path.name}:{mutant.line} {f'caught by {by}' if by else 'SURVIVED'}"
         print(f"{len(verdicts)}/{len(mutants)} {said}, {(time.monotonic() - start) / 60.0:.1f} min", flush=True)
-    wrong = mutant_judges.wrong_ones({(_is_plain(v.mutant), v.by) for v in verdicts if v.by}, _known)
-    return [v for v in verdicts if (_is_plain(v.mutant), v.by) not in wrong]
-
-
-def _is_plain(mutant: Mutant) -> bool:
-    return mutant_judges.is_plain(mutant.path, mutant.line)
+    return verdicts
 
 
 def _verdict(mutant: Mutant) -> Verdict | None:
