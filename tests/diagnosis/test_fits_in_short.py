@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import LinAlgError
-from test_diagnosis_oracles import problem_of, structure
+from test_diagnosis_oracles import PLATE, STRIKER, problem_of, structure
 from test_diagnosis_oracles_in_short import short_record
 
 from crash_estimator.core.diagnosis.mechanics.linearization import _steps, linearise
+from crash_estimator.core.diagnosis.mechanics.masses import masses
 from crash_estimator.core.diagnosis.mechanics.outputs import output_noise
 from crash_estimator.core.diagnosis.observation.noise_inflation import with_inflated_noise
 from crash_estimator.core.diagnosis.observation.record import observe
@@ -20,6 +21,9 @@ from crash_estimator.core.diagnosis.output_error.problem import make_problem
 from crash_estimator.core.diagnosis.output_error.simulation import simulate
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 from crash_estimator.core.diagnosis.residuals.residuals import _absorbed, analyse
+from crash_estimator.core.diagnosis.selection.score_screening import screen
+from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.effects.effect import Addition
 from crash_estimator.core.effects.kinds.element_force import ElementForce
 from crash_estimator.core.structure import Coefficient, EffectSpec
 from crash_replay.recording import Channel, Recording
@@ -140,3 +144,26 @@ def test_what_is_left_in_one_band_counts_as_noise_as_strong_as_it_is_there(recor
     assert_allclose(
         variance, np.diag([1.0 + np.sum(z**2) / 10, 1.0, 1.0]), rtol=0.01, atol=1e-6
     )  # the last bin is not full
+
+
+def test_a_body_without_a_mass_counts_as_1_kg(recording):
+    """Of a fixed one the equation is its force's."""
+    problem, _ = problem_of(structure(EffectSpec("added_mass", "plate", 8.0)), recording)
+    assert_allclose(masses(problem.layout, problem.layout.start), [STRIKER, PLATE + 8.0, 1.0])
+
+
+def test_what_an_effect_gains_by_the_screening_is_what_its_fit_gains_where_it_acts_linearly(recording):
+    """A damper on the mount, which never parts: the evidence of the model with it, less that of the one without, which
+    knows all but 20 of the mount's 900 N s/m."""
+    whole = structure()
+    foam, mount = whole.elements
+    model = replace(whole, elements=(foam, replace(mount, damping=Coefficient(880.0))))
+    records = [observe(model, recording)]
+    magnitudes = measure_magnitudes(model, records, 12)
+    damper = Addition(EFFECTS["viscous_damping"], "mount")
+    without, with_it = (fit(make_problem(magnitudes, records, found)) for found in ((), (damper,)))
+    (screened,) = screen(magnitudes, records, (), [damper], fitted=without)
+    (term,) = with_it.layout.terms
+    assert screened.gain == pytest.approx(with_it.evidence - without.evidence, abs=0.1)
+    assert screened.coefficient == pytest.approx(with_it.theta[term.coefficient], rel=0.02, abs=0.5)
+    assert screened.std == pytest.approx(np.sqrt(with_it.covariance[term.coefficient, term.coefficient]), rel=0.02)

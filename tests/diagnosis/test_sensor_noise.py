@@ -12,6 +12,7 @@ from crash_estimator.benchmarks.second_judge import judge, right
 from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.core.diagnosis.observation.whitening import filtered, weights
 from crash_estimator.core.noise_spectrum import NoiseSpectrum
+from crash_estimator.core.sensor_noise import sensor_noise
 from crash_estimator.model_file import ModelFile
 from crash_replay.second_generator.cases import case_of, drawn
 
@@ -77,3 +78,15 @@ def test_nothing_above_the_band_is_compared():
     white = NoiseSpectrum(1.0, np.inf)
     left = filtered(both[:, None], weights([white], 100.0, n, period))[:, 0]
     assert np.abs(left - np.sin(2.0 * np.pi * 20.0 * time))[20:-20].max() < 0.1
+
+
+@pytest.mark.parametrize("rate", [1000.0, 10_000.0])
+def test_without_a_rest_the_noise_is_that_beside_the_motion_of_the_crash(rate):
+    """A push of 300 m/s^2 with white noise of 2 m/s^2, sampled slowly or fast."""
+    time_ns = (np.arange(int(0.15 * rate)) / rate * 1e9).astype(np.int64)
+    motion = 300.0 * np.sin(np.pi * time_ns * 1e-9 / 0.15) ** 2
+    found = [
+        sensor_noise(motion + np.random.default_rng(k).normal(0.0, 2.0, len(time_ns)), time_ns, rests=False).std
+        for k in range(20)
+    ]
+    assert np.median(found) == pytest.approx(2.0, rel=0.15)

@@ -9,17 +9,19 @@ import pytest
 from helpers_alone import Silence, attending
 
 from crash_estimator.kept import Rows
-from crash_estimator.nodes import composed, viewer_node, whole_estimates
+from crash_estimator.nodes import catching_up, composed, viewer_node, whole_estimates
 from crash_estimator.nodes.diagnosis_node import DiagnosisNode
 from crash_estimator.nodes.diagnosis_worker import Worker
 from crash_estimator.nodes.estimator_node import EstimatorNode
 from crash_estimator.nodes.estimator_parameters import table_for
+from crash_estimator.nodes.hearing import hear
 from crash_estimator.nodes.intake import Intake
 from crash_estimator.nodes.later import Later
 from crash_estimator.nodes.revised_estimates import RevisedEstimates, Wanted
 from crash_estimator.nodes.viewer_node import ViewerNode
 from crash_estimator.nodes.whole_estimates import QUIET, WholeEstimates
 from crash_replay.attending import Progress
+from crash_replay.recording import RecordingError
 
 
 @pytest.mark.parametrize(("incomplete", "status"), [(["", ""], 0), (["", "kalman: 3 samples missing"], 1)])
@@ -361,3 +363,49 @@ def test_of_samples_sent_again_those_of_the_pass_are_handed_out(number, handed_o
     before = [one for one in node.waiting if one is not head]
     assert [len(one.arrival.rows.time_ns) for one in before] == [handed_out] * bool(handed_out)
     assert head.sent_again == node.asked_again == len(kept[0].time_ns) == 5
+
+
+@pytest.mark.parametrize(
+    ("since_look", "since_sample", "asks"),
+    [(0.5, 2.0, True), (0.5, 0.5, False), (5.0, 5.0, False)],  # the last: the process itself was stopped
+)
+def test_what_is_behind_is_asked_for_where_nothing_comes_though_this_process_ran(
+    monkeypatch, since_look, since_sample, asks
+):
+    asked, now = [], 100.0
+    monkeypatch.setattr(catching_up.time, "monotonic", lambda: now)
+    late = catching_up.CatchingUp(Silence(), None, None, None)
+    late.looked_at, late.came_at, late.ask_at_once = now - since_look, now - since_sample, lambda: asked.append(now)
+    late.look()
+    assert len(asked) == asks and late.looked_at == now
+
+
+def test_messages_are_heard_as_their_bytes():
+    """What does not decode is left out with a line, and the next is taken."""
+    made, taken, complaints = [], [], []
+    node = SimpleNamespace(create_subscription=lambda *given, **more: made.append((given, more)))
+    said = SimpleNamespace(complain=lambda topic, text: complaints.append(text))
+    hear(node, said, int, "samples", taken.append, None, decode=lambda raw: _two_bytes(raw))
+    ((_, _, on_message, _), more) = made[0]
+    assert more == {"raw": True}
+    for raw in (b"ab", b"a", b"cd"):
+        on_message(raw)
+    assert taken == [b"ab", b"cd"] and complaints == ["topic samples: too short: left out"]
+
+
+def _two_bytes(raw: bytes) -> bytes:
+    if len(raw) < 2:
+        raise RecordingError("too short")
+    return raw
+
+
+@pytest.mark.parametrize(
+    ("asked", "busy", "done"), [(True, False, True), (True, True, False), (False, False, False), (None, False, False)]
+)
+def test_a_diagnosis_is_done_when_its_final_answer_is_given(asked, busy, done):
+    node = SimpleNamespace(
+        kept=SimpleNamespace(missing=lambda end: 0), end=60, total=60, run=1, stopped="", cannot_be_had="",
+        asked=None if asked is None else SimpleNamespace(final=asked), worker=SimpleNamespace(busy=busy),
+        model=SimpleNamespace(complete=True), prepared=True,
+    )  # fmt: skip
+    assert DiagnosisNode._progress(node).done == done
