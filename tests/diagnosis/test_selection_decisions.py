@@ -7,6 +7,7 @@ import pytest
 
 from crash_estimator.core.diagnosis import THRESHOLDS
 from crash_estimator.core.diagnosis.online import candidate_turns
+from crash_estimator.core.diagnosis.report import diagnosis as report
 from crash_estimator.core.diagnosis.selection import assumptions, fitted_model, forward_selection, pair_search
 from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
 from crash_estimator.core.diagnosis.selection.fitted_model import forces_jump
@@ -52,11 +53,11 @@ def test_what_leaves_noise_or_has_no_time_is_not_searched_in_a_smaller_band(monk
 
 @pytest.mark.parametrize(("wanted", "out_of_time", "searches"), [(True, False, 2), (False, False, 1), (True, True, 1)])
 def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypatch, wanted, out_of_time, searches):
-    begun, given = [], model(1.5)
+    begun, cells, given = [], [], model(1.5)
     made_up = {
         "first_step": lambda *given: None,
         "forward_selection": lambda *given: begun.append(given) or ([step(given[2])], given[2]),
-        "measure_magnitudes": lambda *given: SimpleNamespace(cells=72),
+        "measure_magnitudes": lambda structure, records, finer: cells.append(finer) or SimpleNamespace(cells=finer),
         "fit_given": lambda *given: model(1.5),
         "drift_of": lambda fit: SimpleNamespace(constant=True),
         "analyse": lambda fit: None,
@@ -69,6 +70,7 @@ def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypa
     magnitudes = SimpleNamespace(structure=None, records=(), cells=36)
     assumptions._with_curves_as_fine_as_needed(magnitudes, given, {}, ())
     assert len(begun) == searches
+    assert cells == [2 * magnitudes.cells], "of half the width"
 
 
 @pytest.mark.parametrize(("knots", "goes_on"), [((0.0, 0.1), True), ((0.0, 0.1, 0.2), False)])
@@ -194,3 +196,40 @@ def test_where_a_slower_contact_is_likelier_it_is_judged_as_sharply(monkeypatch)
     given = SimpleNamespace(point=None, evidence=first.evidence), SimpleNamespace(white=False)
     assert fitted_model._with_more_care(problem, *given) == (slower, "judged")
     assert asked == [(slower, True)]
+
+
+class Judged(Exception):
+    """A verdict has been asked for: what comes after it is not looked at."""
+
+
+@pytest.mark.parametrize(
+    ("effects", "time_zero", "counted"), [(2, True, 2), (2, False, 2), (0, True, 1), (0, False, 0)]
+)
+def test_a_time_zero_counts_as_what_was_added_where_no_effect_was(monkeypatch, effects, time_zero, counted):
+    """With two effects that are believed together it is none too many."""
+    models = [model(9.0, k) for k in range(effects + 1)]
+    for one in models:
+        one.fit.problem.noise_is_inflated = False
+    path = assumptions.SelectionPath(
+        None, [step(m) for m in models[:-1]] or [step(models[0])], models[-1], 0, None, (), 36
+    )
+    left, sure = SimpleNamespace(share_explained=lambda before: 0.5), SimpleNamespace(coefficient=2.0, std=1.0)
+    made_up = {
+        "band_of": lambda final: None, "left_by": lambda *given: left, "fit_of_all": lambda *given: None,
+        "free_run": lambda fit: SimpleNamespace(rms=1.0), "step_of": lambda *given: sure, "ranking_of": lambda step: (),
+        "drift_of": lambda fit: SimpleNamespace(constant=True), "time_zero_step": lambda *given: sure,
+        "as_ranked": lambda moved: moved, "_removed_by_first_effect": lambda path: 0.9,
+    }  # fmt: skip
+    for name, instead in made_up.items():
+        monkeypatch.setattr(report, name, instead)
+    asked = []
+
+    def judged(evidence, tolerance):
+        asked.append(evidence.added)
+        raise Judged
+
+    monkeypatch.setattr(report, "verdict_on", judged)
+    zero = SimpleNamespace(as_stated=models[0]) if time_zero else None
+    with pytest.raises(Judged):
+        report._answer(None, path, SimpleNamespace(stated=False), zero)
+    assert asked == [counted]
