@@ -3,7 +3,7 @@
 A mutant is the code with one operator, condition or number changed. First the tests are run once on the code as it is,
 to learn which executes which line, and how long it takes; those that take long, or fail, judge nothing, and what a test
 starts in another process is not seen. A mutant is then judged by the tests that execute its line, quickest first; the
-first that fails, or takes ten times as long and 10 s more, has caught it, unless it does so on the code as it is, too,
+first that fails, or takes ten times as long and 30 s more, has caught it, unless it does so on the code as it is, too,
 run after the same tests. A line that is executed at import alone, as a constant's, is judged by the tests that execute
 a line with its name, then by those of its file. What is not caught within a time counts as not caught. What numba
 compiles, and where that takes its constants from, runs as Python (NUMBA_DISABLE_JIT): so its lines are seen, and
