@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from crash_estimator.core.diagnosis.output_error.problem import make_problem
 from crash_estimator.core.diagnosis.output_error.simulation import simulate
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 from crash_estimator.core.diagnosis.residuals.residuals import _absorbed, analyse
+from crash_estimator.core.diagnosis.residuals.score_test import MODES, _with_motion
 from crash_estimator.core.diagnosis.selection.score_screening import screen
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.effects.effect import Addition
@@ -167,3 +169,32 @@ def test_what_an_effect_gains_by_the_screening_is_what_its_fit_gains_where_it_ac
     assert screened.gain == pytest.approx(with_it.evidence - without.evidence, abs=0.1)
     assert screened.coefficient == pytest.approx(with_it.theta[term.coefficient], rel=0.02, abs=0.5)
     assert screened.std == pytest.approx(np.sqrt(with_it.covariance[term.coefficient, term.coefficient]), rel=0.02)
+
+
+class Columns(NamedTuple):
+    """Of the linearised equations what directions are put beside."""
+
+    others: int
+    column: np.ndarray
+    body: np.ndarray
+    acts: np.ndarray
+
+
+class Rows(NamedTuple):
+    linear: Columns
+    rows: np.ndarray
+    columns: np.ndarray
+
+
+def test_directions_of_masses_and_forces_stand_after_the_parameters_and_before_the_knots():
+    """Two parameters and two knots; each mode once for the free body's mass, once for the force on it."""
+    linear = Columns(3, np.array([0, 1]), np.array([0, 1]), np.zeros((2, 4)))
+    equations = Rows(linear, np.array([[1.0, 9.0], [-3.0, 9.0], [2.0, 9.0], [0.0, 9.0]]), np.array([0, 1, 30, 31]))
+    modes = np.cos(np.pi * np.arange(1, MODES + 1) * (np.arange(4) / 4.0)[:, None])
+    found = _with_motion(equations, modes, [0], first=40)
+    assert found.columns.tolist() == [0, 1, *range(40, 40 + 2 * MODES), 30, 31]
+    assert found.linear.others == 3 + 2 * MODES
+    assert found.linear.column.tolist() == [0, 1, *range(3, 3 + 2 * MODES)]
+    assert found.linear.body.tolist() == [0, 1] + [0] * 2 * MODES
+    assert_allclose(found.linear.acts[2], -equations.rows[:, 0] * modes[:, 0])
+    assert_allclose(found.linear.acts[2 + MODES], 3.0 * modes[:, 0])

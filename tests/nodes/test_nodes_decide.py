@@ -409,3 +409,27 @@ def test_a_diagnosis_is_done_when_its_final_answer_is_given(asked, busy, done):
         model=SimpleNamespace(complete=True), prepared=True,
     )  # fmt: skip
     assert DiagnosisNode._progress(node).done == done
+
+
+@pytest.mark.parametrize(
+    ("asked", "display", "served"),
+    [(True, False, True), (True, True, False), (False, False, False), (False, True, False)],
+)
+def test_a_page_is_served_where_it_is_asked_for_and_no_window_can_be_had(monkeypatch, asked, display, served):
+    settings = {name: allowed.default for name, allowed in viewer_node.PARAMETERS.items()}
+    made_up = {
+        "declare_parameters": lambda node, table: settings | {"web": asked, "open": False},
+        "check_outputs": lambda *given: None, "has_display": lambda: display,
+        "Sinks": lambda *given: SimpleNamespace(port=settings["port"], url="url", rrd=""),
+        "Recorder": lambda *given, **more: None, "WebViewer": lambda url, port: SimpleNamespace(page="page"),
+        "Attending": lambda *given: SimpleNamespace(tell=lambda: None), "Account": lambda *given: None,
+        "HealthReport": lambda *given: None, "hear": lambda *given: None, "Future": lambda: None,
+    }  # fmt: skip
+    for name, instead in made_up.items():
+        monkeypatch.setattr(viewer_node, name, instead)
+    monkeypatch.setattr(viewer_node.os, "nice", lambda n: None)
+    monkeypatch.setattr(viewer_node.Node, "__init__", lambda *given, **more: None)
+    for name in ("create_subscription", "create_timer"):
+        monkeypatch.setattr(ViewerNode, name, lambda *given, **more: None)
+    monkeypatch.setattr(ViewerNode, "get_logger", lambda node: SimpleNamespace(info=print, warning=print))
+    assert bool(ViewerNode().web) == served
