@@ -14,6 +14,7 @@ from test_diagnosis_oracles import (
     structure,
 )
 
+from crash_estimator.core.structure import EffectSpec
 from crash_replay.recording import Channel, Recording, Test
 
 RATE = 4000.0
@@ -41,7 +42,10 @@ def recording() -> Recording:
     return short_record(RATE, 40, 260, seed=1, speed=SPEED)
 
 
-@pytest.mark.parametrize("effect", KINDS, ids=shown)
+BETWEEN_SAMPLES = EffectSpec("channel_delay", "plate_ax", 3.1e-4)
+
+
+@pytest.mark.parametrize("effect", [*KINDS, BETWEEN_SAMPLES], ids=shown)
 def test_the_derivatives_of_the_outputs_are_their_finite_differences(effect, recording):
     assert_derivatives_agree(structure(effect), recording, NEAR[effect.type])
 

@@ -17,7 +17,7 @@ from crash_estimator.core.diagnosis.mechanics.outputs import output_noise
 from crash_estimator.core.diagnosis.observation.noise_inflation import with_inflated_noise
 from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.output_error import gauss_newton
-from crash_estimator.core.diagnosis.output_error.gauss_newton import fit
+from crash_estimator.core.diagnosis.output_error.gauss_newton import _half_way_back, fit
 from crash_estimator.core.diagnosis.output_error.problem import make_problem
 from crash_estimator.core.diagnosis.output_error.simulation import simulate
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
@@ -198,3 +198,16 @@ def test_directions_of_masses_and_forces_stand_after_the_parameters_and_before_t
     assert found.linear.body.tolist() == [0, 1] + [0] * 2 * MODES
     assert_allclose(found.linear.acts[2], -equations.rows[:, 0] * modes[:, 0])
     assert_allclose(found.linear.acts[2 + MODES], 3.0 * modes[:, 0])
+
+
+def test_half_way_back_is_half_of_each_acceleration(recording):
+    """Where the other one is finite; what is not stays as it was."""
+    problem, good = problem_of(structure(EffectSpec("viscous_damping", "foam", 0.0)), recording)
+    (trajectory,) = good.trajectories
+    far = trajectory.a + 8.0
+    far[5, 0] = np.inf
+    (found,) = _half_way_back(problem, good, good._replace(trajectories=(trajectory._replace(a=far),))).trajectories
+    free = [0, 1]  # striker and plate
+    expected = trajectory.a[:, free] + 4.0
+    expected[5, 0] -= 4.0
+    assert_allclose(found.a[:, free], expected)

@@ -9,9 +9,11 @@ from numpy.testing import assert_allclose
 from crash_estimator.core.diagnosis.output_error.gauss_newton import _shorten, solve
 from crash_estimator.core.diagnosis.output_error.laplace_evidence import log_prior, posterior
 from crash_estimator.core.diagnosis.output_error.normal_equations import Normal
+from crash_estimator.core.diagnosis.output_error.problem import embedding
 from crash_estimator.core.diagnosis.parameterization.free_curve import ROUGHNESS, Curve, adapted_roughness
 from crash_estimator.core.diagnosis.parameterization.layout import _element_link, _modes
 from crash_estimator.core.diagnosis.parameterization.prior import Builder as PriorBuilder
+from crash_estimator.core.diagnosis.residuals.score_test import _statistic
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.structure import Coefficient, Element
 
@@ -124,3 +126,26 @@ def test_a_curve_s_force_at_no_crush_is_no_parameter():
     """Its column there is -1, as everywhere where there is none."""
     curve = PriorBuilder().curve("spring", np.array([-0.1, 0.0, 0.1]), 0.1, 1e4, 1.0)
     assert curve.column.tolist() == [0, -1, 1]
+
+
+@pytest.mark.parametrize("high", [1e-3, 1.0, 1e6])
+def test_a_step_does_not_go_beyond_a_limit_by_more_than_rounding(high):
+    """Unlimited it would end a hundred-millionth of the limit beyond it."""
+    of = SimpleNamespace(
+        size=1,
+        prior=SimpleNamespace(precision=np.zeros((1, 1)), mean=np.zeros(1), low=-np.ones(1), high=np.array([high])),
+    )
+    normal = Normal(np.eye(1), np.array([high * (1.0 + 1e-8)]), 10.0, 4, 0.0)
+    assert solve(of, normal, np.zeros(1)).delta[0] == high
+
+
+def test_the_parameters_of_a_model_are_found_among_more_by_their_names():
+    base = SimpleNamespace(knots=2, names=["b", "c"], offsets=[])
+    wide = SimpleNamespace(knots=3, names=["a", "b", "c"], offsets=[])
+    assert embedding(base, wide).tolist() == [0, 1, 4, 5]
+
+
+def test_only_directions_that_the_model_leaves_are_judged():
+    """Of three the first two stand out by 3 and 1 of their standard deviations, the third is the model's own."""
+    square, freedom = _statistic(np.array([3.0, 2.0, 5.0]), np.diag([1.0, 4.0, 0.0]))
+    assert (square, freedom) == (pytest.approx(3.0**2 + 1.0), 2)

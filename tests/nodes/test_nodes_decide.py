@@ -9,7 +9,8 @@ import pytest
 from helpers_alone import Silence, attending
 
 from crash_estimator.kept import Rows
-from crash_estimator.nodes import catching_up, composed, viewer_node, whole_estimates
+from crash_estimator.nodes import catching_up, composed, diagnosis_parameters, viewer_node, whole_estimates
+from crash_estimator.nodes.diagnosis_messages import revision_name
 from crash_estimator.nodes.diagnosis_node import DiagnosisNode
 from crash_estimator.nodes.diagnosis_worker import Worker
 from crash_estimator.nodes.estimator_node import EstimatorNode
@@ -433,3 +434,19 @@ def test_a_page_is_served_where_it_is_asked_for_and_no_window_can_be_had(monkeyp
         monkeypatch.setattr(ViewerNode, name, lambda *given, **more: None)
     monkeypatch.setattr(ViewerNode, "get_logger", lambda node: SimpleNamespace(info=print, warning=print))
     assert bool(ViewerNode().web) == served
+
+
+def test_a_revision_is_named_by_what_was_taken_out_and_added():
+    friction, damper = (SimpleNamespace(type=kind, target="front") for kind in ("friction", "damper"))
+    given = SimpleNamespace(name="car", effects=[friction])
+    assert revision_name(given, given, []) == "car"
+    changed = SimpleNamespace(name="car", effects=[])
+    assert revision_name(given, changed, [damper]) == "car - friction on front + damper on front"
+
+
+@pytest.mark.parametrize(("given", "seconds"), [(0.0, float("inf")), (8.0, 8.0)])
+def test_a_diagnosis_without_a_time_limit_has_all_the_time(given, seconds):
+    values = {name: allowed.default for name, allowed in diagnosis_parameters.PARAMETERS.items()} | {
+        "time_limit": given
+    }
+    assert diagnosis_parameters.Wanted.from_values(values).seconds == seconds
