@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.output_error.gauss_newton import _shorten, solve
 from crash_estimator.core.diagnosis.output_error.laplace_evidence import log_prior, posterior
 from crash_estimator.core.diagnosis.output_error.normal_equations import Normal
@@ -15,7 +16,8 @@ from crash_estimator.core.diagnosis.parameterization.layout import _element_link
 from crash_estimator.core.diagnosis.parameterization.prior import Builder as PriorBuilder
 from crash_estimator.core.diagnosis.residuals.score_test import _statistic
 from crash_estimator.core.effects import EFFECTS
-from crash_estimator.core.structure import Coefficient, Element
+from crash_estimator.core.structure import Body, Coefficient, Element, Structure
+from crash_replay.recording import Channel, Recording, Test
 
 
 def layout(std, low, mean):
@@ -149,3 +151,15 @@ def test_only_directions_that_the_model_leaves_are_judged():
     """Of three the first two stand out by 3 and 1 of their standard deviations, the third is the model's own."""
     square, freedom = _statistic(np.array([3.0, 2.0, 5.0]), np.diag([1.0, 4.0, 0.0]))
     assert (square, freedom) == (pytest.approx(3.0**2 + 1.0), 2)
+
+
+def test_every_acceleration_is_observed_also_one_that_no_body_of_the_model_has():
+    """What is mounted in the car may move on its own: its channel is where that is seen."""
+    channels = tuple(Channel(name, "acceleration") for name in ("car_ax", "battery_ax")) + (
+        Channel("belt_fx", "force"),
+    )
+    time_ns = np.arange(-30, 60, dtype=np.int64) * 1_000_000
+    values = np.random.default_rng(1).standard_normal((90, 3))
+    bodies = Body("car", 1000.0, ("car_ax",)), Body("wall", fixed=True)
+    model = Structure("car", bodies, (Element("front", ("car", "wall"), Coefficient(1e5)),))
+    assert set(observe(model, Recording(Test("t", channels), time_ns, values)).signals) == {"car_ax", "battery_ax"}
