@@ -39,16 +39,18 @@ class OrderBank:
     memory: float = 0.005  # s, as in RLS
     printed: bool = False  # the members follow the thesis's 4.10 as printed; it has no such bank
     members: tuple[GaussNewton, ...] = field(init=False)
-    tried: tuple[tuple[int, int], ...] = field(init=False)  # (p, q) of each
 
     def __post_init__(self):
         if not isinstance(self.largest, int) or not 0 <= self.largest <= 10:
             raise ModelError(f"largest order of gauss_newton_orders must be from 0 to 10, got {self.largest!r}")
-        orders = [(p, q) for p in range(self.largest + 1) for q in range(self.largest + 1)]
         more: dict = THESIS if self.printed else {}
-        members = tuple(GaussNewton(self.settings, p, q, self.forgetting, self.memory, **more) for p, q in orders)
+        members = tuple(GaussNewton(self.settings, p, q, self.forgetting, self.memory, **more) for p, q in self.tried)
         object.__setattr__(self, "members", members)
-        object.__setattr__(self, "tried", tuple(orders))
+
+    @property
+    def tried(self) -> list[tuple[int, int]]:
+        """(p, q) of each member."""
+        return [(p, q) for p in range(self.largest + 1) for q in range(self.largest + 1)]
 
     @property
     def regressor_errors(self) -> bool:
