@@ -8,8 +8,9 @@ from helpers_estimation import oscillator, oscillator_recording
 from numpy.testing import assert_allclose
 
 from crash_estimator.core.characteristic import Characteristic, characteristics
+from crash_estimator.core.compare_free_run import compare
 from crash_estimator.core.fold import run
-from crash_estimator.core.free_run import compare, free_run
+from crash_estimator.core.free_run import free_run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.core.structure import Coefficient, ModelError
 from crash_estimator.core.validation import (

@@ -14,13 +14,14 @@ from crash_replay.recording import Recording, RecordingError
 from crash_replay.shown_units import readable
 
 from .core.characteristic import characteristics
+from .core.compare_free_run import compare
 from .core.derived_motion import with_accelerations
 from .core.diagnosis import UNEXPLAINED, Diagnosis, diagnose
 from .core.effects import EFFECTS
 from .core.effects.applied import applied
 from .core.effects.effect import Effect
 from .core.fold import run
-from .core.free_run import compare, free_run
+from .core.free_run import free_run
 from .core.methods import make_estimator
 from .core.structure import ModelError, Structure
 from .core.validation import validate

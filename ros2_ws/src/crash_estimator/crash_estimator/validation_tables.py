@@ -4,7 +4,7 @@ import numpy as np
 
 from crash_replay.shown_units import readable
 
-from .core.free_run import Comparison
+from .core.compare_free_run import Comparison
 from .core.validation import LEVELS, Validation
 from .tables import table, unit_of
 

@@ -19,7 +19,6 @@ from .derived_motion import between_samples
 from .effects.effect import ElementMotion
 from .estimate import Description, Estimate
 from .kinematics import beyond
-from .rating import Rating, rate
 from .structure import ModelError, Structure
 from .structure_parts import NOTHING, outlasts
 
@@ -49,17 +48,6 @@ class FreeRun(NamedTuple):
     predicted: np.ndarray  # (n, q) in the equations' units
     measured: np.ndarray  # (n, q)
     measured_velocity: np.ndarray  # (n, b) m/s, integrated measurement
-
-
-class Comparison(NamedTuple):
-    """One signal, simulated against measured."""
-
-    name: str
-    unit: str
-    measured_peak: float  # the value largest in magnitude
-    simulated_peak: float
-    rms: float  # of the difference
-    rating: Rating | None  # None: too short, with gaps, or constant
 
 
 def free_run(
@@ -277,32 +265,3 @@ def _bridged(values: np.ndarray) -> np.ndarray:
     valid = np.isfinite(values)
     k = np.arange(len(values))
     return np.interp(k, k[valid], values[valid]) if valid.any() else np.zeros(len(values))
-
-
-def compare(
-    structure: Structure, description: Description, run: FreeRun, smooth=lambda values: values
-) -> list[Comparison]:
-    """Every equation's signal and every free body's velocity; `smooth` (a filter) is applied to both signals."""
-    signals = [
-        (name, unit, smooth(run.measured[:, k]), smooth(run.predicted[:, k]))
-        for k, (name, unit) in enumerate(zip(description.equations, description.equation_units))
-    ]
-    signals += [
-        (f"{body.name} velocity", "m/s", run.measured_velocity[:, k], run.velocity[:, k])
-        for k, body in enumerate(structure.bodies)
-        if body.free and body.acceleration
-    ]
-    return [_comparison(*signal) for signal in signals]
-
-
-def _comparison(name: str, unit: str, measured: np.ndarray, simulated: np.ndarray) -> Comparison:
-    valid = np.isfinite(measured) & np.isfinite(simulated)
-    try:
-        rating = rate(measured, simulated)
-    except ValueError:
-        rating = None
-    if not valid.any():
-        return Comparison(name, unit, np.nan, np.nan, np.nan, rating)
-    peak, simulated_peak = (float(s[valid][np.argmax(np.abs(s[valid]))]) for s in (measured, simulated))
-    rms = float(np.sqrt(np.mean((measured - simulated)[valid] ** 2)))
-    return Comparison(name, unit, peak, simulated_peak, rms, rating)

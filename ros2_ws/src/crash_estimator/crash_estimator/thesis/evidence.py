@@ -16,9 +16,10 @@ from crash_replay.recording import Recording
 from crash_replay.said import Parser, say
 from crash_replay.synthetic.recordings import SCENARIOS
 
+from ..core.compare_free_run import compare
 from ..core.errors import equation_errors
 from ..core.fold import run
-from ..core.free_run import compare, free_run
+from ..core.free_run import free_run
 from ..core.methods import make_estimator
 from ..figures import markdown_table
 from ..model_file import load_model

@@ -8,9 +8,10 @@ import numpy as np
 from crash_replay.readers import read_source
 from crash_replay.recording import Recording
 
+from ..core.compare_free_run import compare
 from ..core.compare_tests import coarser
 from ..core.errors import equation_errors
-from ..core.free_run import compare, free_run
+from ..core.free_run import free_run
 from ..core.validation import validate
 from ..figures import Line, Panel, draw, markdown_table
 from ..model_file import load_model

@@ -8,8 +8,9 @@ import numpy as np
 from crash_replay.synthetic.recordings import SCENARIOS
 
 from ..core.characteristic import Characteristic, characteristics
+from ..core.compare_free_run import Comparison, compare
 from ..core.compare_tests import curve_difference
-from ..core.free_run import Comparison, compare, free_run
+from ..core.free_run import free_run
 from ..figures import Line, Panel, draw, markdown_table
 from ..model_file import load_model
 from .experiments import Run, estimate

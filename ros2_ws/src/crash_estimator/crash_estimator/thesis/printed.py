@@ -14,8 +14,9 @@ import numpy as np
 from crash_replay.readers import read_source
 from crash_replay.synthetic.recordings import SCENARIOS
 
+from ..core.compare_free_run import compare
 from ..core.fold import run
-from ..core.free_run import compare, free_run
+from ..core.free_run import free_run
 from ..core.methods import METHODS, make_estimator
 from ..figures import markdown_table
 from ..model_file import load_model

@@ -10,8 +10,9 @@ from crash_replay.recording import Recording
 from crash_replay.synthetic.scenario import Truth, record
 
 from ..core.characteristic import characteristics
+from ..core.compare_free_run import Comparison, compare
 from ..core.estimators.effective_mass import with_effective_masses
-from ..core.free_run import Comparison, FreeRun, compare, free_run
+from ..core.free_run import FreeRun, free_run
 from ..core.structure import Structure
 from ..core.validation import validate
 from ..figures import Line, Panel, draw, markdown_table

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.compare_free_run import Comparison, compare
 from ..core.estimate import Description, Estimate, ParameterStatus, as_sent, nothing_said
-from ..core.free_run import Comparison, FreeRun, compare, free_run
+from ..core.free_run import FreeRun, free_run
 from ..core.structure import ModelError, Structure
 from ..core.validation import Validation, validate
 from .blocks import Block, ForceBlock, ParameterBlock, ResidualBlock, estimator_of, join, revision_of, said_of

@@ -10,10 +10,11 @@ from crash_replay.said import say
 from crash_replay.shown_units import readable
 
 from ...core.characteristic import Characteristic, characteristics
+from ...core.compare_free_run import Comparison, compare
 from ...core.derived_motion import with_accelerations
 from ...core.effects.applied import applied
 from ...core.fold import run
-from ...core.free_run import Comparison, FreeRun, compare, free_run
+from ...core.free_run import FreeRun, free_run
 from ...core.methods import make_estimator
 from ...core.structure import ModelError, Structure
 from ...model_file import load_model
