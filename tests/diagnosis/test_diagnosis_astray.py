@@ -1,6 +1,7 @@
 """A fit that has gone astray must not pass for what a model leaves; and what is told is what is applied."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,12 +10,14 @@ from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.output_error.continuation import FROM_SIMULATION
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 from crash_estimator.core.diagnosis.report.diagnosis import diagnose
+from crash_estimator.core.diagnosis.residuals.in_band import in_band
 from crash_estimator.core.diagnosis.residuals.residuals import free_run
+from crash_estimator.core.diagnosis.selection import pruning
 from crash_estimator.core.diagnosis.selection.acceptance import better
 from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
 from crash_estimator.core.diagnosis.selection.forward_selection import first_step, forward_selection
 from crash_estimator.core.diagnosis.selection.pruning import up_to_the_least_error
-from crash_estimator.core.diagnosis.selection.selection_step import in_recorded_noise, weighed
+from crash_estimator.core.diagnosis.selection.selection_step import band_of_steps, in_recorded_noise, sized, weighed
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.model_file import ModelFile
 from crash_replay.synthetic.hidden.cases import draw_case
@@ -84,26 +87,18 @@ def test_the_structure_with_what_was_added_holds_the_coefficients_that_are_told(
     assert [(e.type, e.target, e.coefficient, dict(e.shape)) for e in applied] == told
 
 
-def test_steps_after_the_least_error_are_not_told():
+def test_steps_after_the_least_error_are_not_told(monkeypatch):
     path, final = searched()
     assert not final.white and len(final.additions) == 2
-    models = [step.before for step in path[:2]] + [final]
-    assert models[0].residuals.rms > models[1].residuals.rms > models[2].residuals.rms
+    sizes = [in_band(one.fit, one.residuals, band_of_steps(path)).rms for one in sized(path, final)]
+    assert sizes[0] > sizes[1] > sizes[2]
     assert up_to_the_least_error(path, final, 0) == (path, final)
-
-    def with_errors(*errors):
-        made = [
-            model._replace(residuals=model.residuals._replace(rms=rms))
-            for model, rms in zip(models, errors, strict=True)
-        ]
-        again = [step._replace(before=model) for step, model in zip(path, made, strict=False)]
-        return [*again, *(step._replace(before=made[2]) for step in path[2:])], made
-
     for errors, kept in (((3.0, 4.0, 3.5), 0), ((3.0, 2.0, 2.0), 1), ((3.0, 2.0, 1.0), 2), ((3.0, 4.0, 1.0), 2)):
-        told, made = with_errors(*errors)
-        cut, last = up_to_the_least_error(told, made[2], 0)
-        assert last is made[kept]
-        assert cut == (told if kept == 2 else told[: kept + 1])
+        told = iter(errors)
+        monkeypatch.setattr(pruning, "in_band", lambda fit, residuals, cfc, told=told: SimpleNamespace(rms=next(told)))
+        cut, last = up_to_the_least_error(path, final, 0)
+        assert last is [path[0].before, path[1].before, final][kept]
+        assert cut == (path if kept == 2 else path[: kept + 1])
 
 
 def test_an_effect_that_is_found_to_be_nothing_is_not_told():

@@ -83,7 +83,7 @@ def test_a_search_out_of_time_has_looked_at_all_candidates_once(monkeypatch):
     monkeypatch.setattr(forward_selection, "common_effects", lambda *given: {})
     monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda *given: step)
     monkeypatch.setattr(forward_selection, "with_rare_ones", lambda m, e, first: first)
-    monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done: done)
+    monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done, path, evenly: done)
     monkeypatch.setattr(forward_selection, "better", lambda one, other: False)
     monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final, present: (path, final))
     path, _ = forward_selection._one_by_one(MAGNITUDES, {}, model(), [], 0)

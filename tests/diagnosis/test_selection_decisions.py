@@ -8,7 +8,13 @@ import pytest
 from crash_estimator.core.diagnosis import THRESHOLDS
 from crash_estimator.core.diagnosis.online import candidate_turns
 from crash_estimator.core.diagnosis.report import diagnosis as report
-from crash_estimator.core.diagnosis.selection import assumptions, fitted_model, forward_selection, pair_search
+from crash_estimator.core.diagnosis.selection import (
+    assumptions,
+    fitted_model,
+    forward_selection,
+    pair_search,
+    selection_step,
+)
 from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
 from crash_estimator.core.diagnosis.selection.fitted_model import forces_jump
 from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
@@ -18,7 +24,9 @@ def model(left: float, additions: int = 0, evidence: float = 0.0) -> SimpleNames
     """One that leaves a mean square of residuals, in the variance of the noise, with so many additions."""
     fit = SimpleNamespace(problem=SimpleNamespace(noise_is_inflated=False), evidence=evidence, additions=additions)
     residuals = SimpleNamespace(mean_square=left)
-    return SimpleNamespace(fit=fit, residuals=residuals, white=left < 1.1, additions=("one",) * additions, records=())
+    return SimpleNamespace(
+        roughness=None, fit=fit, residuals=residuals, white=left < 1.1, additions=("one",) * additions, records=()
+    )
 
 
 def step(before: SimpleNamespace, gain: float = 500.0) -> SelectionStep:
@@ -57,6 +65,7 @@ def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypa
     made_up = {
         "first_step": lambda *given: None,
         "forward_selection": lambda *given: begun.append(given) or ([step(given[2])], given[2]),
+        "sized": lambda steps, final: [final],
         "measure_magnitudes": lambda structure, records, finer: cells.append(finer) or SimpleNamespace(cells=finer),
         "fit_given": lambda *given: model(1.5),
         "drift_of": lambda fit: SimpleNamespace(constant=True),
@@ -133,14 +142,17 @@ def one_by_one(monkeypatch, left: float, search, rare: bool = False) -> tuple[li
     monkeypatch.setattr(forward_selection, "is_rare", lambda addition: rare)
     monkeypatch.setattr(forward_selection, "in_recorded_noise", said)
     monkeypatch.setattr(forward_selection, "with_rare_ones", lambda m, e, first: first)
-    monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done: done)
+    monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done, path, evenly: done)
     monkeypatch.setattr(forward_selection, "_without", lambda model, found: model)
     monkeypatch.setattr(
         forward_selection,
         "added",
         lambda m, r, before, best: (m, model(0.9 * (before.residuals.mean_square), len(before.additions) + 1)),
     )
-    monkeypatch.setattr(forward_selection, "analyse", lambda fit: SimpleNamespace(mean_square=1.0))
+    monkeypatch.setattr(selection_step, "analyse", lambda fit: None)
+    monkeypatch.setattr(forward_selection, "band_of_steps", lambda path: None)
+    monkeypatch.setattr(forward_selection, "evenly_fitted", lambda *given: "with it")
+    monkeypatch.setattr(forward_selection, "explains_too_little", lambda *given: False)
     monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final, present: (path, final))
     return forward_selection._one_by_one(SimpleNamespace(structure=None), {}, model(left), [], 0)
 
@@ -215,9 +227,10 @@ def test_a_time_zero_counts_as_what_was_added_where_no_effect_was(monkeypatch, e
     )
     left, sure = SimpleNamespace(share_explained=lambda before: 0.5), SimpleNamespace(coefficient=2.0, std=1.0)
     made_up = {
-        "band_of": lambda final: None, "left_by": lambda *given: left, "fit_of_all": lambda *given: None,
+        "band_of_steps": lambda steps: None, "left_by": lambda *given: left, "fit_of_all": lambda *given: None,
+        "sized": lambda steps, final: models,
         "free_run": lambda fit: SimpleNamespace(rms=1.0), "step_of": lambda *given: sure, "ranking_of": lambda step: (),
-        "drift_of": lambda fit: SimpleNamespace(constant=True), "time_zero_step": lambda *given: sure,
+        "_drift_left_by": lambda *given: SimpleNamespace(constant=True), "time_zero_step": lambda *given: sure,
         "as_ranked": lambda moved: moved, "_removed_by_first_effect": lambda path: 0.9,
     }  # fmt: skip
     for name, instead in made_up.items():

@@ -7,8 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from crash_estimator.core.diagnosis.observation.whitening import weights
-from crash_estimator.core.diagnosis.report.left import Left, _kept, vibration_of
+from crash_estimator.core.diagnosis.report.left import Left, vibration_of
 from crash_estimator.core.diagnosis.report.time_zero_step import time_zero_step
+from crash_estimator.core.diagnosis.residuals.in_band import _kept
 from crash_estimator.core.noise_spectrum import NoiseSpectrum
 from crash_replay.conditioning import cfc_filter
 

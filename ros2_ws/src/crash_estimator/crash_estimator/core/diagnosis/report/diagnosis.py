@@ -15,16 +15,16 @@ from ..observation.pace import at_its_own_pace
 from ..observation.record import ObservedRecord, observe
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import analyse, free_run, noise_floor
-from ..residuals.score_test import drift_of
+from ..residuals.score_test import Drift, drift_of
 from ..selection.acceptance import share_removed
 from ..selection.assumptions import SelectionPath, first_believed, select, up_to
 from ..selection.fitted_model import Model
 from ..selection.rare_effects import common_effects
-from ..selection.selection_step import fit_of_all
+from ..selection.selection_step import band_of_steps, fit_of_all, sized
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_limit import out_of_time, time_limit
 from ..selection.time_zero import Shift, TimeZero, moved_by, onsets, sharpened, time_zero_wrong
-from .left import Left, band_of, left_by
+from .left import Left, left_by
 from .model_effects import structure_with
 from .ranking import Ranked, StepReport, ranking_of, step_of
 from .time_zero_step import TIME_ZERO, as_ranked, signals_begin, time_zero_step
@@ -171,21 +171,19 @@ def _from_a_sharper_time_zero(
 
 
 def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zero: TimeZero | None) -> Diagnosis:
-    band = band_of(path.final)
-    given = zero.as_stated if zero else path.steps[0].before
+    models = sized(path.steps, path.final)
+    band = band_of_steps(path.steps)
+    given = zero.as_stated if zero else models[0]
     before = left_by(given, band)
     if tolerance.stated and tolerance.admits(before):  # whoever says so wants nothing added
         path, zero = up_to(path, 0), None
-    steps, final, present = path.steps, path.final, path.present
-    models = tuple(step.before for step in steps)
-    if models[-1] is not final:
-        models = (*models, final)
-    added = final.additions[present:]
+        models = sized(path.steps, path.final)
+    steps, final, added = path.steps, models[-1], path.added
     runs = [free_run(model.fit).rms for model in models]
     pairs = zip(steps, models, models[1:], zip(runs, runs[1:], strict=False), strict=False)  # the last has no successor
-    of_all = fit_of_all(steps[: len(added)], final)
+    of_all = fit_of_all(steps[: len(added)], path.final)
     reports = effects_added = tuple(step_of(*each, of_all) for each in list(pairs)[: len(added)])
-    drift = drift_of(path.as_recorded)
+    drift = _drift_left_by(final, path.records)
     sure = next((k for k, one in enumerate(reports) if abs(one.coefficient) <= one.std), len(added))
     if 0 < sure < len(added) and not (final.white and drift.constant):
         return _answer(structure, up_to(path, sure), tolerance, zero)
@@ -224,9 +222,14 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
     )
 
 
+def _drift_left_by(final: Model, records: Sequence[ObservedRecord]) -> Drift:
+    """In the noise of records, as the sensors', of the motion and the parameters that its error is told of."""
+    return drift_of(final.fit._replace(problem=final.fit.problem.on(records)))
+
+
 def _removed_by_first_effect(path: SelectionPath) -> float:
     """Share of the misfit; what one element lacks another may as well, then the two count as one."""
     effects = [addition.effect.name for addition in path.added]
     alike = next((k for k, effect in enumerate(effects) if effect != effects[0]), len(effects))
-    models = [*(step.before for step in path.steps), path.final]
+    models = sized(path.steps, path.final)
     return share_removed(models[0].residuals, models[alike].residuals)

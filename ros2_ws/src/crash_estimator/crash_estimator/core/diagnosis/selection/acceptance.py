@@ -6,6 +6,7 @@ import numpy as np
 
 from ..observation.record import ObservedRecord
 from ..output_error.gauss_newton import Fit
+from ..residuals.in_band import in_band
 from ..residuals.residuals import Residuals
 from .thresholds import THRESHOLDS
 
@@ -42,9 +43,15 @@ def share_removed(before: Residuals, after: Residuals) -> float:
     return (before.mean_square - after.mean_square) / max(before.mean_square - 1.0, 1e-9)
 
 
-def explains_too_little(before: Residuals, after: Sequence[Residuals]) -> bool:
-    """Whether an addition that still leaves more than noise removes next to nothing, by each way of looking at it."""
-    return max(share_removed(before, one) for one in after) < THRESHOLDS.least_share
+def explains_too_little(before, after, cfc: int | None) -> bool:
+    """Whether an addition that still leaves more than noise removes next to nothing, neither of all that is sampled nor
+    in the band that the model speaks for: above that a structure rings, which hides what was explained.
+
+    before, after: the model (a `Model` each) without it and with it, as their errors are told; cfc: the band's class.
+    """
+    left, without = (in_band(one.fit, one.residuals, cfc) for one in (after, before))
+    shares = left.share_explained(without), share_removed(before.residuals, after.residuals)
+    return max(shares) < THRESHOLDS.least_share
 
 
 def needed_gain(adds_to_white: bool) -> float:

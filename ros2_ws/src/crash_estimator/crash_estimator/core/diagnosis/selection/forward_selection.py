@@ -4,14 +4,14 @@ from collections.abc import Mapping, Sequence
 
 from ...effects.effect import Addition, Effect
 from ..parameterization.magnitudes import Magnitudes
-from ..residuals.residuals import analyse
 from .acceptance import better, explains_too_little, needed_gain, share_removed
 from .candidate_fits import CandidateFit
+from .even_fit import evenly_fitted
 from .fitted_model import Model
 from .pair_search import Pair, as_expected, near_the_floor, two_at_once, two_of_one_effect
 from .pruning import up_to_the_least_error, without_the_superseded
 from .rare_effects import common_effects, is_rare, with_rare_ones
-from .selection_step import SelectionStep, added, in_recorded_noise, weighed
+from .selection_step import SelectionStep, added, band_of_steps, in_recorded_noise, weighed
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
 
@@ -60,13 +60,13 @@ def _one_by_one(
 ) -> tuple[list[SelectionStep], Model]:  # fmt: skip
     """The best candidate is added as long as there is one; path: the steps that have led to the model, first: the next
     one in the sensors' noise, where it is known."""
-    common = common_effects(magnitudes.structure, effects)
+    common, evenly = common_effects(magnitudes.structure, effects), None
     while not (path and out_of_time()):
         if first is None:
             fitted = not _as_many_as_believed(model, present)
             first = in_recorded_noise(magnitudes, common, model, path, fitted)
             first = first if path else with_rare_ones(magnitudes, effects, first)
-        done, first = weighed(magnitudes, common, first), None
+        done, first = weighed(magnitudes, common, first, path, evenly), None
         path.append(done)
         fair = _without(model, done.best) if done.best and done.before is model else model
         if better(fair, model):
@@ -78,10 +78,9 @@ def _one_by_one(
             # where the noise had to be taken larger, the model before the step is the one fitted with it
             return without_the_superseded(magnitudes, path, done.before, present)
         magnitudes, larger = added(magnitudes, model.records, model, done.best)
-        if not larger.white:
-            after = larger.residuals, analyse(done.best.fit)
-            if explains_too_little(done.before.residuals, after):
-                return path, done.before
+        evenly = None if larger.white else evenly_fitted(done.with_best, band_of_steps(path), larger)
+        if evenly and explains_too_little(done.sized, evenly, band_of_steps(path)):
+            return path, done.before
         model = larger
     return path, model
 

@@ -7,9 +7,10 @@ from ..output_error.continuation import SMALL_STEPS
 from ..output_error.gauss_newton import fit
 from ..output_error.problem import make_problem
 from ..parameterization.magnitudes import Magnitudes
+from ..residuals.in_band import in_band
 from ..residuals.residuals import analyse
 from .fitted_model import Model
-from .selection_step import SelectionStep, fit_stated
+from .selection_step import SelectionStep, band_of_steps, fit_stated, sized
 from .thresholds import THRESHOLDS
 
 
@@ -55,12 +56,13 @@ def up_to_the_least_error(
     What leaves white noise stands as it is. In a noise as large as the misfit a fit can end where the evidence is
     better and the error is not: what comes after the least error is no part of an explanation.
     """
+    if final.white:
+        return list(path), final
     models = [step.before for step in path]
     if models[-1] is not final:
         models.append(final)
-    if final.white:
-        return list(path), final
-    errors = [model.residuals.rms for model in models[: 1 + len(final.additions) - present]]
+    told = sized(path, final)[: 1 + len(final.additions) - present]
+    errors = [in_band(one.fit, one.residuals, band_of_steps(path)).rms for one in told]
     last = errors.index(min(errors))
     last = next((k for k, step in enumerate(path[:last]) if _is_nothing(step, final)), last)
     return (list(path[: last + 1]), models[last]) if last < len(errors) - 1 else (list(path), final)

@@ -14,9 +14,11 @@ from ..output_error.gauss_newton import Fit, fit
 from ..output_error.normal_equations import may_diverge
 from ..output_error.problem import Point
 from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
+from ..residuals.in_band import band_of
 from ..residuals.residuals import analyse
 from .acceptance import better
 from .candidate_fits import CandidateFit, fit_candidates
+from .even_fit import evenly_fitted
 from .fitted_model import Model, fit_model
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
@@ -28,11 +30,23 @@ class SelectionStep(NamedTuple):
     before: Model
     candidates: list[CandidateFit]
     as_recorded: Sequence[CandidateFit] = ()  # in the sensors' noise, where `candidates` are in a larger one
+    evenly: Model | None = None  # the model before it as its size is told, where noise was taken larger
+
+    @property
+    def sized(self) -> Model:
+        """The model before it, whose error is told and compared."""
+        return self.evenly or self.before
 
     @property
     def best(self) -> CandidateFit | None:
         first = self.candidates[0] if self.candidates else None
         return first if first and first.fit and first.gain > THRESHOLDS.gain else None
+
+    @property
+    def with_best(self) -> Model:
+        """The model with the best candidate, in the same noise."""
+        found = self.candidates[0]
+        return Model((*self.before.additions, found.addition), found.fit, analyse(found.fit), self.before.roughness)
 
     @property
     def leaves_noise(self) -> bool:
@@ -54,8 +68,14 @@ def in_recorded_noise(
     return SelectionStep(model, found, found)
 
 
-def weighed(magnitudes: Magnitudes, effects: Mapping[str, Effect], done: SelectionStep) -> SelectionStep:
-    """The step as it is where only noise is left, else against what the best candidate leaves."""
+def weighed(
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], done: SelectionStep, path: Sequence[SelectionStep] = (),
+    evenly: Model | None = None,
+) -> SelectionStep:  # fmt: skip
+    """The step as it is where only noise is left, else against what the best candidate leaves.
+
+    path: the steps before; evenly: the model before it, as it was fitted with all outputs alike.
+    """
     model, found = done.before, done.candidates
     if done.leaves_noise:
         return done
@@ -74,7 +94,8 @@ def weighed(magnitudes: Magnitudes, effects: Mapping[str, Effect], done: Selecti
             before = before._replace(residuals=before.residuals._replace(band_test=decided))
         others = fit_candidates(magnitudes, effects, before, in_other_noise=found, fitted=fitted)
         done = SelectionStep(before, others, found)
-    return done
+    known = [evenly] if evenly else []
+    return done._replace(evenly=evenly_fitted(done.before, band_of_steps([*path, done]), *known))
 
 
 def _noise_left_by(step: SelectionStep, records: Sequence[ObservedRecord]) -> tuple[ObservedRecord, ...]:
@@ -123,6 +144,18 @@ def as_found(found: CandidateFit) -> Addition:
     term = found.fit.layout.term(found.addition)
     shapes = {name: float(np.exp(theta[p])) for name, p in term.shapes.items()}
     return replace(found.addition, coefficient=float(theta[term.coefficient]), shapes=shapes)
+
+
+def sized(steps: Sequence[SelectionStep], final: Model) -> tuple[Model, ...]:
+    """The models before the steps, and the last one, whose errors are told and compared."""
+    models = tuple(step.sized for step in steps)
+    return models if steps[-1].before is final else (*models, evenly_fitted(final, band_of_steps(steps)))
+
+
+def band_of_steps(steps: Sequence[SelectionStep]) -> int | None:
+    """The class in which the models' errors are told and compared: that of the model as given."""
+    given = steps[0].before
+    return band_of(given.records, given.residuals)
 
 
 def fit_of_all(steps: Sequence[SelectionStep], final: Model) -> Fit:
