@@ -17,7 +17,12 @@ from crash_estimator.core.diagnosis.selection.acceptance import better
 from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
 from crash_estimator.core.diagnosis.selection.forward_selection import first_step, forward_selection
 from crash_estimator.core.diagnosis.selection.pruning import up_to_the_least_error
-from crash_estimator.core.diagnosis.selection.selection_step import band_of_steps, in_recorded_noise, sized, weighed
+from crash_estimator.core.diagnosis.selection.selection_step import (
+    band_of_steps,
+    in_recorded_noise,
+    sized_models,
+    weighed,
+)
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.model_file import ModelFile
 from crash_replay.synthetic.hidden.cases import draw_case
@@ -90,7 +95,7 @@ def test_the_structure_with_what_was_added_holds_the_coefficients_that_are_told(
 def test_steps_after_the_least_error_are_not_told(monkeypatch):
     path, final = searched()
     assert not final.white and len(final.additions) == 2
-    sizes = [in_band(one.fit, one.residuals, band_of_steps(path)).rms for one in sized(path, final)]
+    sizes = [in_band(one.fit, one.residuals, band_of_steps(path)).rms for one in sized_models(path, final)]
     assert sizes[0] > sizes[1] > sizes[2]
     assert up_to_the_least_error(path, final, 0) == (path, final)
     for errors, kept in (((3.0, 4.0, 3.5), 0), ((3.0, 2.0, 2.0), 1), ((3.0, 2.0, 1.0), 2), ((3.0, 4.0, 1.0), 2)):

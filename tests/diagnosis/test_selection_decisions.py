@@ -65,7 +65,7 @@ def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypa
     made_up = {
         "first_step": lambda *given: None,
         "forward_selection": lambda *given: begun.append(given) or ([step(given[2])], given[2]),
-        "sized": lambda steps, final: [final],
+        "sized_models": lambda steps, final: [final],
         "measure_magnitudes": lambda structure, records, finer: cells.append(finer) or SimpleNamespace(cells=finer),
         "fit_given": lambda *given: model(1.5),
         "drift_of": lambda fit: SimpleNamespace(constant=True),
@@ -228,7 +228,7 @@ def test_a_time_zero_counts_as_what_was_added_where_no_effect_was(monkeypatch, e
     left, sure = SimpleNamespace(share_explained=lambda before: 0.5), SimpleNamespace(coefficient=2.0, std=1.0)
     made_up = {
         "band_of_steps": lambda steps: None, "left_by": lambda *given: left, "fit_of_all": lambda *given: None,
-        "sized": lambda steps, final: models,
+        "sized_models": lambda steps, final: models,
         "free_run": lambda fit: SimpleNamespace(rms=1.0), "step_of": lambda *given: sure, "ranking_of": lambda step: (),
         "_drift_left_by": lambda *given: SimpleNamespace(constant=True), "time_zero_step": lambda *given: sure,
         "as_ranked": lambda moved: moved, "_removed_by_first_effect": lambda path: 0.9,

@@ -20,7 +20,7 @@ from ..selection.acceptance import share_removed
 from ..selection.assumptions import SelectionPath, first_believed, select, up_to
 from ..selection.fitted_model import Model
 from ..selection.rare_effects import common_effects
-from ..selection.selection_step import band_of_steps, fit_of_all, sized
+from ..selection.selection_step import band_of_steps, fit_of_all, sized_models
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_limit import out_of_time, time_limit
 from ..selection.time_zero import Shift, TimeZero, moved_by, onsets, sharpened, time_zero_wrong
@@ -171,13 +171,13 @@ def _from_a_sharper_time_zero(
 
 
 def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zero: TimeZero | None) -> Diagnosis:
-    models = sized(path.steps, path.final)
+    models = sized_models(path.steps, path.final)
     band = band_of_steps(path.steps)
     given = zero.as_stated if zero else models[0]
     before = left_by(given, band)
     if tolerance.stated and tolerance.admits(before):  # whoever says so wants nothing added
         path, zero = up_to(path, 0), None
-        models = sized(path.steps, path.final)
+        models = sized_models(path.steps, path.final)
     steps, final, added = path.steps, models[-1], path.added
     runs = [free_run(model.fit).rms for model in models]
     pairs = zip(steps, models, models[1:], zip(runs, runs[1:], strict=False), strict=False)  # the last has no successor
@@ -231,5 +231,5 @@ def _removed_by_first_effect(path: SelectionPath) -> float:
     """Share of the misfit; what one element lacks another may as well, then the two count as one."""
     effects = [addition.effect.name for addition in path.added]
     alike = next((k for k, effect in enumerate(effects) if effect != effects[0]), len(effects))
-    models = sized(path.steps, path.final)
+    models = sized_models(path.steps, path.final)
     return share_removed(models[0].residuals, models[alike].residuals)

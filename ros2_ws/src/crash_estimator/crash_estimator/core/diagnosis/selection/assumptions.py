@@ -26,7 +26,7 @@ from .fitted_model import Model, fit_given, fit_model
 from .forward_selection import first_step, forward_selection
 from .pruning import up_to_the_least_error
 from .rare_effects import found_as_common
-from .selection_step import SelectionStep, as_found, sized
+from .selection_step import SelectionStep, as_found, sized_models
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
 
@@ -228,7 +228,7 @@ def _with_curves_as_fine_as_needed(
         if elsewhere(begun):
             return begun
     steps, final = forward_selection(magnitudes, effects, given, first)
-    as_recorded = in_the_sensors_noise(sized(steps, final)[-1], records)
+    as_recorded = in_the_sensors_noise(sized_models(steps, final)[-1], records)
     finer = measure_magnitudes(structure, records, FINER_CELLS)
     mimicked = final.white and not drift_of(as_recorded).constant
     if not out_of_time() and _wants_finer_curves(final, mimicked, analyse(as_recorded), finer, len(present)):
@@ -239,10 +239,10 @@ def _with_curves_as_fine_as_needed(
         fewer = len(finer_final.additions) < len(final.additions) or not final.white
         if finer_final.white and (fewer or (mimicked and drift_of(finer_final.fit).constant)):
             steps, final, cells = finer_steps, finer_final, finer.cells
-            as_recorded = in_the_sensors_noise(sized(steps, final)[-1], records)
+            as_recorded = in_the_sensors_noise(sized_models(steps, final)[-1], records)
     steps, reported = up_to_the_least_error(steps, final, len(present))
     if reported is not final:
-        final, as_recorded = reported, in_the_sensors_noise(sized(steps, reported)[-1], records)
+        final, as_recorded = reported, in_the_sensors_noise(sized_models(steps, reported)[-1], records)
     return SelectionPath(structure, steps, final, len(present), as_recorded, records, cells)
 
 

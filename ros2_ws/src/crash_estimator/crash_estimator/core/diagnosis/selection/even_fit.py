@@ -17,16 +17,17 @@ from ..parameterization.layout import Layout
 from ..residuals.in_band import in_band
 from ..residuals.residuals import analyse, output_scale
 from .fitted_model import Model
+from .time_limit import out_of_time
 
 
 def evenly_fitted(model: Model, cfc: int | None, *others: Model) -> Model:
     """Of fits from where the model, and others with the same additions, have ended, and from the measured motion, the
-    one that leaves the least below a class; where noise was not taken larger, the model itself.
+    one that leaves the least below a class; where noise was not taken larger, or there is no time, the model itself.
 
     Whether all that is left is noise only the sensors' own noise decides: what was found of that stays.
     """
     problem = model.fit.problem
-    if not problem.noise_is_inflated:
+    if not problem.noise_is_inflated or out_of_time():
         return model
     evenly = problem.on([_all_alike(record, problem.layout) for record in problem.records])
     ended = [model.fit, *(one.fit for one in others if _as_many_parameters(one.fit.layout, problem.layout))]

@@ -10,7 +10,7 @@ from ..parameterization.magnitudes import Magnitudes
 from ..residuals.in_band import in_band
 from ..residuals.residuals import analyse
 from .fitted_model import Model
-from .selection_step import SelectionStep, band_of_steps, fit_stated, sized
+from .selection_step import SelectionStep, band_of_steps, fit_stated, sized_models
 from .thresholds import THRESHOLDS
 
 
@@ -61,7 +61,7 @@ def up_to_the_least_error(
     models = [step.before for step in path]
     if models[-1] is not final:
         models.append(final)
-    told = sized(path, final)[: 1 + len(final.additions) - present]
+    told = sized_models(path, final)[: 1 + len(final.additions) - present]
     errors = [in_band(one.fit, one.residuals, band_of_steps(path)).rms for one in told]
     last = errors.index(min(errors))
     last = next((k for k, step in enumerate(path[:last]) if _is_nothing(step, final)), last)

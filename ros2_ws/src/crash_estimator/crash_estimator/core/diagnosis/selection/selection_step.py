@@ -146,7 +146,7 @@ def as_found(found: CandidateFit) -> Addition:
     return replace(found.addition, coefficient=float(theta[term.coefficient]), shapes=shapes)
 
 
-def sized(steps: Sequence[SelectionStep], final: Model) -> tuple[Model, ...]:
+def sized_models(steps: Sequence[SelectionStep], final: Model) -> tuple[Model, ...]:
     """The models before the steps, and the last one, whose errors are told and compared."""
     models = tuple(step.sized for step in steps)
     return models if steps[-1].before is final else (*models, evenly_fitted(final, band_of_steps(steps)))

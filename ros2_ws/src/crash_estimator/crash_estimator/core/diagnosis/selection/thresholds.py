@@ -37,8 +37,8 @@ class Thresholds(NamedTuple):
     """Mean square, thirty times the noise, from which on no care in fitting makes noise of what is left. At 100 a
     simulated case that the usual fits lead astray was given up; on docs/outside.md both say the same."""
     least_share: float = 0.15
-    """Of what the model before it leaves above the floor: an addition that removes less of it, and still leaves more
-    than noise, is no explanation."""
+    """Of what the model before it leaves above the floor, of all that is sampled or in the band that the model speaks
+    for: an addition that removes less of both, and still leaves more than noise, is no explanation."""
     all_but_folds: float = 0.95
     """Share that two of a kind must remove, where they leave more than noise: the rest may be folds of the curves.
     Share from which the first effects are believed though more were added; and from which the first one alone is,
