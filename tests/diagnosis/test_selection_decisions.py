@@ -135,7 +135,15 @@ def test_beside_a_rare_effect_none_is_fitted(monkeypatch):
     assert asked == [True, False]
 
 
-def one_by_one(monkeypatch, left: float, search, rare: bool = False) -> tuple[list, SimpleNamespace]:
+def test_what_explains_too_little_is_not_added_and_nothing_after_it(monkeypatch):
+    told = [False, True]
+    path, final = one_by_one(monkeypatch, 1e3, lambda before, fitted: step(before), little=lambda *given: told.pop(0))
+    assert len(final.additions) == 1 and final is path[1].before and len(path) == 2 and not told
+
+
+def one_by_one(
+    monkeypatch, left: float, search, rare: bool = False, little=lambda *given: False
+) -> tuple[list, SimpleNamespace]:
     """Each addition takes a tenth of the mean square away; left: of it at first, search: before, fitted."""
     said = lambda m, e, before, path, fitted: search(before, fitted)  # noqa: E731
     monkeypatch.setattr(forward_selection, "common_effects", lambda *given: {})
@@ -152,7 +160,7 @@ def one_by_one(monkeypatch, left: float, search, rare: bool = False) -> tuple[li
     monkeypatch.setattr(selection_step, "analyse", lambda fit: None)
     monkeypatch.setattr(forward_selection, "band_of_steps", lambda path: None)
     monkeypatch.setattr(forward_selection, "evenly_fitted", lambda *given: "with it")
-    monkeypatch.setattr(forward_selection, "explains_too_little", lambda *given: False)
+    monkeypatch.setattr(forward_selection, "explains_too_little", little)
     monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final, present: (path, final))
     return forward_selection._one_by_one(SimpleNamespace(structure=None), {}, model(left), [], 0)
 
@@ -231,7 +239,7 @@ def test_a_time_zero_counts_as_what_was_added_where_no_effect_was(monkeypatch, e
         "sized_models": lambda steps, final: models,
         "free_run": lambda fit: SimpleNamespace(rms=1.0), "step_of": lambda *given: sure, "ranking_of": lambda step: (),
         "_drift_left_by": lambda *given: SimpleNamespace(constant=True), "time_zero_step": lambda *given: sure,
-        "as_ranked": lambda moved: moved, "_removed_by_first_effect": lambda path: 0.9,
+        "as_ranked": lambda moved: moved, "_removed_by_first_effect": lambda *given: 0.9,
     }  # fmt: skip
     for name, instead in made_up.items():
         monkeypatch.setattr(report, name, instead)

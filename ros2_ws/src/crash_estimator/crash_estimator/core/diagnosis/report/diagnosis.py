@@ -9,7 +9,7 @@ from crash_replay.recording import Recording
 from ...clipping import without_clipped
 from ...derived_motion import with_accelerations
 from ...effects import EFFECTS
-from ...effects.effect import Effect
+from ...effects.effect import Addition, Effect
 from ...structure import ModelError, Structure
 from ..observation.pace import at_its_own_pace
 from ..observation.record import ObservedRecord, observe
@@ -188,6 +188,7 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
     if 0 < sure < len(added) and not (final.white and drift.constant):
         return _answer(structure, up_to(path, sure), tolerance, zero)
     ranking, after = ranking_of(steps[0]), left_by(final, band)
+    by_first = _removed_by_first_effect(models, added)
     if zero:
         runs = [free_run(given.fit).rms, *runs]
         moved = time_zero_step(zero, models[0], (runs[0], runs[1]))
@@ -196,7 +197,6 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
     weighed = final.fit.problem.noise_is_inflated or after.share_explained(before) > THRESHOLDS.all_but_folds
     certain = all(abs(one.coefficient) > one.std for one in reports)
     many = len(added) or len(reports)  # a time zero is none of the effects that may be too many
-    by_first = _removed_by_first_effect(path)
     evidence = Evidence(many, final.white, drift, before, after, ranking, weighed, certain, by_first)
     verdict = verdict_on(evidence, tolerance)
     if added and verdict.word == ADEQUATE:
@@ -227,9 +227,8 @@ def _drift_left_by(final: Model, records: Sequence[ObservedRecord]) -> Drift:
     return drift_of(final.fit._replace(problem=final.fit.problem.on(records)))
 
 
-def _removed_by_first_effect(path: SelectionPath) -> float:
+def _removed_by_first_effect(models: Sequence[Model], added: Sequence[Addition]) -> float:
     """Share of the misfit; what one element lacks another may as well, then the two count as one."""
-    effects = [addition.effect.name for addition in path.added]
+    effects = [addition.effect.name for addition in added]
     alike = next((k for k, effect in enumerate(effects) if effect != effects[0]), len(effects))
-    models = sized_models(path.steps, path.final)
     return share_removed(models[0].residuals, models[alike].residuals)
