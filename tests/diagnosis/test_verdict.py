@@ -116,6 +116,17 @@ def test_evidence_is_weighed_in_noise_as_large_as_what_is_left_or_where_next_to_
     assert evidence.weighed == weighed
 
 
+@pytest.mark.parametrize(("settled", "asked"), [(True, "as recorded"), (False, "as sized, in the sensors' noise")])
+def test_whether_the_rest_varies_is_asked_of_a_motion_that_its_parameters_simulate(monkeypatch, settled, asked):
+    monkeypatch.setattr(report, "analyse", lambda fit: None)
+    monkeypatch.setattr(report, "settled", lambda fit, residuals: settled)
+    monkeypatch.setattr(report, "drift_of", lambda fit: fit)
+    fit = SimpleNamespace(problem=SimpleNamespace(on=lambda records: f"as sized, in {records}"))
+    fit._replace = lambda problem: problem
+    path = SimpleNamespace(as_recorded="as recorded", records="the sensors' noise")
+    assert report._drift_left_by(path, SimpleNamespace(fit=fit)) == asked
+
+
 def test_a_tolerance_is_a_rating_or_a_share_of_the_peak():
     assert tolerance_of("0.8") == Tolerance(rating=0.8) and tolerance_of(" 5% ") == Tolerance(of_peak=0.05)
     for wrong in ("5", "much", "", "-1%", "100%", "0", "nan", "inf%"):

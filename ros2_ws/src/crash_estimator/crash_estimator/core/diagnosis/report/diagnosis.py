@@ -16,7 +16,7 @@ from ..observation.record import ObservedRecord, observe
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import analyse, free_run, noise_floor
 from ..residuals.score_test import Drift, drift_of
-from ..selection.acceptance import share_removed
+from ..selection.acceptance import settled, share_removed
 from ..selection.assumptions import SelectionPath, first_believed, select, up_to
 from ..selection.fitted_model import Model
 from ..selection.rare_effects import common_effects
@@ -183,7 +183,7 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
     pairs = zip(steps, models, models[1:], zip(runs, runs[1:], strict=False), strict=False)  # the last has no successor
     of_all = fit_of_all(steps[: len(added)], path.final)
     reports = effects_added = tuple(step_of(*each, of_all) for each in list(pairs)[: len(added)])
-    drift = _drift_left_by(final, path.records)
+    drift = _drift_left_by(path, final)
     sure = next((k for k, one in enumerate(reports) if abs(one.coefficient) <= one.std), len(added))
     if 0 < sure < len(added) and not (final.white and drift.constant):
         return _answer(structure, up_to(path, sure), tolerance, zero)
@@ -222,9 +222,16 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
     )
 
 
-def _drift_left_by(final: Model, records: Sequence[ObservedRecord]) -> Drift:
-    """In the noise of records, as the sensors', of the motion and the parameters that its error is told of."""
-    return drift_of(final.fit._replace(problem=final.fit.problem.on(records)))
+def _drift_left_by(path: SelectionPath, sized: Model) -> Drift:
+    """In the sensors' noise; sized: the final model as its error is told.
+
+    Of a structure that rings a fit in that noise may end in a motion that its parameters do not simulate, and what that
+    leaves says nothing of time: it is asked of the fit that was sized then.
+    """
+    recorded = path.as_recorded
+    if settled(recorded, analyse(recorded)):
+        return drift_of(recorded)
+    return drift_of(sized.fit._replace(problem=sized.fit.problem.on(path.records)))
 
 
 def _removed_by_first_effect(models: Sequence[Model], added: Sequence[Addition]) -> float:
