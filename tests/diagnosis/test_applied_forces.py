@@ -175,7 +175,7 @@ def test_the_derivatives_of_motion_outputs_are_their_finite_differences(model, o
             other[parameter] += sign * step
             there = simulate(problem, other, point.trajectories).trajectories[0]
             rows = linearise(experiment, other, there).rows
-            moved.append(predicted(experiment, other, rows, there)[0])
+            moved.append(predicted(experiment, other, rows, there))
         expected = binned(observed_record, equations.sampling.weight * (moved[0] - moved[1]) / (2.0 * step))[:, 0]
         column = found[:, list(equations.columns).index(parameter)]
         assert np.linalg.norm(expected) > 0.0

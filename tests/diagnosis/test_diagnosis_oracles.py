@@ -130,7 +130,7 @@ def outputs(problem: OutputErrorProblem, point: Point) -> np.ndarray:
     """(n, q) at the samples."""
     (experiment,) = problem.experiments
     rows = linearise(experiment, point.theta, point.trajectories[0]).rows
-    return predicted(experiment, point.theta, rows, point.trajectories[experiment.index])[0][experiment.record.at]
+    return predicted(experiment, point.theta, rows, point.trajectories[experiment.index])[experiment.record.at]
 
 
 def test_the_simulation_is_that_of_an_ode_solver(recording):

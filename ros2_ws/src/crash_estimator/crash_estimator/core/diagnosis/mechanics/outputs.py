@@ -1,13 +1,15 @@
 """From accelerations and forces of the bodies to what the channels show, errors and noise of the channels included."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
+from ..observation.record import Output
 from ..observation.trajectory import Trajectory
 from ..parameterization.experiment import Experiment
 from ..parameterization.layout import Layout
-from .driven_motion import distortion
+from .driven_motion import Distortion, distortion
 from .linear_system import Sampling
 from .masses import masses
 
@@ -57,7 +59,7 @@ def _delay(layout: Layout, theta: np.ndarray, channel: str) -> tuple[float, int]
 def sampling(experiment: Experiment, theta: np.ndarray) -> tuple[Sampling, list[int]]:
     """How rows become outputs, and the parameters that act on outputs only."""
     layout, record, _ = experiment
-    found = [distortion(layout, theta, output.channel) for output in layout.outputs]
+    found = _distortions(layout, theta)
     lag = np.array([d.delay / record.step for d in found])
     parameters = [p for d in found for p in d.parameters]
     return Sampling(
@@ -71,37 +73,62 @@ def sampling(experiment: Experiment, theta: np.ndarray) -> tuple[Sampling, list[
     ), parameters
 
 
-def predicted(experiment: Experiment, theta: np.ndarray, rows: np.ndarray, trajectory: Trajectory):
-    """(g, q) outputs, and the columns of what acts on outputs only: (q, parameter, (g,)).
-
-    Accelerations and forces are those of rows (g, b), velocities and displacements the trajectory's.
-    """
+def predicted(experiment: Experiment, theta: np.ndarray, rows: np.ndarray, trajectory: Trajectory) -> np.ndarray:
+    """(g, q) outputs. Accelerations and forces are those of rows (g, b), velocities and displacements the
+    trajectory's."""
     layout, record, r = experiment
-    outputs, by = np.zeros((len(record.time), len(layout.outputs))), []
-    step = record.step
-    for q, output in enumerate(layout.outputs):
-        d = distortion(layout, theta, output.channel)
-        shown = (rows, trajectory.v, trajectory.x)[output.of_motion][:, output.body]
-        lag = d.delay / step
-        whole, fraction = int(np.floor(lag)), lag - np.floor(lag)
-        true = (1.0 - fraction) * _delayed(shown, whole)
-        if fraction:
-            true += fraction * _delayed(shown, whole + 1)
-            true[whole : whole + 1] = 0.0  # still an instant before the impact
-        offset = layout.offsets[r] + q
-        outputs[:, q] = (1.0 + d.gain) * true + d.offset(record.time) + theta[offset]
-        by.append((q, offset, np.ones(len(true))))
+    outputs = np.zeros((len(record.time), len(layout.outputs)))
+    for q, (output, d) in enumerate(zip(layout.outputs, _distortions(layout, theta), strict=True)):
+        true = _late(_shown(output, rows, trajectory), d, record.step)
+        outputs[:, q] = (1.0 + d.gain) * true + d.offset(record.time) + theta[layout.offsets[r] + q]
         if q in layout.drifts[r]:
             outputs[:, q] += theta[layout.drifts[r][q]] * record.time / record.time[-1]
-            by.append((q, layout.drifts[r][q], record.time / record.time[-1]))
-        by += [(q, p, course) for p, course in d.offset_by(record.time)]
+    return outputs
+
+
+def by_channel_errors(
+    experiment: Experiment, theta: np.ndarray, rows: np.ndarray, trajectory: Trajectory
+) -> Iterator[tuple[int, int, np.ndarray]]:
+    """Derivatives of what `predicted` gives by what acts on outputs only: (q, parameter, (g,))."""
+    layout, record, r = experiment
+    for q, (output, d) in enumerate(zip(layout.outputs, _distortions(layout, theta), strict=True)):
+        shown = _shown(output, rows, trajectory)
+        yield q, layout.offsets[r] + q, np.ones(len(shown))
+        if q in layout.drifts[r]:
+            yield q, layout.drifts[r][q], record.time / record.time[-1]
+        yield from ((q, p, course) for p, course in d.offset_by(record.time))
         if d.by_gain >= 0:
-            by.append((q, d.by_gain, true))
+            yield q, d.by_gain, _late(shown, d, record.step)
         if d.by_delay >= 0:
-            slope = (_delayed(shown, whole + 1) - _delayed(shown, whole)) / step
+            whole, fraction = _steps_late(d, record.step)
+            slope = (_delayed(shown, whole + 1) - _delayed(shown, whole)) / record.step
             slope[whole : whole + 1] *= fraction == 0.0
-            by.append((q, d.by_delay, (1.0 + d.gain) * slope))
-    return outputs, by
+            yield q, d.by_delay, (1.0 + d.gain) * slope
+
+
+def _distortions(layout: Layout, theta: np.ndarray) -> list[Distortion]:
+    return [distortion(layout, theta, output.channel) for output in layout.outputs]
+
+
+def _shown(output: Output, rows: np.ndarray, trajectory: Trajectory) -> np.ndarray:
+    """(g,) what a channel without errors shows."""
+    return (rows, trajectory.v, trajectory.x)[output.of_motion][:, output.body]
+
+
+def _steps_late(d: Distortion, step: float) -> tuple[int, float]:
+    """Whole steps of the grid, and the rest of one."""
+    lag = d.delay / step
+    return int(np.floor(lag)), lag - np.floor(lag)
+
+
+def _late(shown: np.ndarray, d: Distortion, step: float) -> np.ndarray:
+    """By the channel's delay."""
+    whole, fraction = _steps_late(d, step)
+    if not fraction:
+        return _delayed(shown, whole)
+    late = (1.0 - fraction) * _delayed(shown, whole) + fraction * _delayed(shown, whole + 1)
+    late[whole : whole + 1] = 0.0  # still an instant before the impact
+    return late
 
 
 def _delayed(values: np.ndarray, steps: int) -> np.ndarray:

@@ -9,7 +9,7 @@ from numba import njit
 from ... import compile_cache as _compile_cache  # noqa: F401  before any compiled function is defined
 from ..mechanics.driven_motion import measured_motion
 from ..mechanics.linearization import Equations, Observer, OtherLaw, linearise
-from ..mechanics.outputs import output_noise, predicted
+from ..mechanics.outputs import by_channel_errors, output_noise, predicted
 from ..observation.record import ObservedRecord
 from ..observation.trajectory import Trajectory
 from ..parameterization.experiment import Experiment
@@ -68,11 +68,13 @@ def _summed(so_far: Normal, experiment: Experiment, theta, trajectory, equations
     flat = flat.reshape(-1, flat.shape[-1])
     products = flat.T @ flat
     _put(equations.columns, products, matrix, vector)
-    noise, filled = output_noise(experiment, theta, record.per_bin), _filled(record)
-    for q, parameter, slope in noise.growth:
-        # a noisy regressor draws its coefficient towards zero, by as much as the noise it brings grows with it
-        vector[parameter] += slope * filled[q]
-    grown += 2.0 * float(filled @ np.log(noise.std / record.noise))
+    noise = output_noise(experiment, theta, record.per_bin)
+    if noise.growth:
+        filled = _filled(record)
+        for q, parameter, slope in noise.growth:
+            # a noisy regressor draws its coefficient towards zero, by as much as the noise it brings grows with it
+            vector[parameter] += slope * filled[q]
+        grown += 2.0 * float(filled @ np.log(noise.std / record.noise))
     return Normal(matrix, vector, cost + float(products[0, 0]), samples + len(flat), grown)
 
 
@@ -101,13 +103,13 @@ def whitened(
     # what acts on outputs only is linearised at the forces' prediction: the measured motion itself is noisy
     weight = equations.sampling.weight
     position = {int(p): j + 1 for j, p in enumerate(equations.columns[: equations.linear.others - 1])}
-    for q, parameter, column in predicted(experiment, theta, equations.rows, trajectory)[1]:
+    for q, parameter, column in by_channel_errors(experiment, theta, equations.rows, trajectory):
         out[:, q, position[parameter]] += binned(record, (weight[:, q] * column)[:, None])[:, 0]
     # along the trajectory: the free bodies' own acceleration less the observer's; fixed forces are in column 0
     along = np.where(layout.kind == FREE, trajectory.a, 0.0)
     if observer:
         along += np.where(layout.kind == FREE, observer.acceleration(trajectory), 0.0)
-    misfit = record.on_grid - predicted(experiment, theta, along, trajectory)[0]
+    misfit = record.on_grid - predicted(experiment, theta, along, trajectory)
     out[:, :, 0] = binned(record, weight * misfit) - out[:, :, 0]
     return record.whitened(out)
 

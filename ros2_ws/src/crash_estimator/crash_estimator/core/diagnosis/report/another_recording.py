@@ -47,7 +47,7 @@ def predict(found: Diagnosis, recording: Recording) -> Predicted:
     theta[problem.layout.offsets[0] + outputs] = fitted.theta[layout.offsets[0] + outputs]
     point = simulate(problem, theta, problem.measured(theta).trajectories)
     (experiment,), (motion,) = problem.experiments, point.trajectories
-    shown = predicted(experiment, theta, linearise(experiment, theta, motion).rows, motion)[0][record.at]
+    shown = predicted(experiment, theta, linearise(experiment, theta, motion).rows, motion)[record.at]
     return Predicted(record.time[record.at], tuple(o.channel for o in layout.outputs), record.measured, shown)
 
 

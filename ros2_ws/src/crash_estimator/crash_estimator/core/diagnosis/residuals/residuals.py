@@ -94,7 +94,7 @@ def _residuals(problem: OutputErrorProblem, point: Point, equations: Sequence[Eq
     outputs, residuals = [], []
     for experiment, each, trajectory in zip(problem.experiments, equations, point.trajectories, strict=True):
         record = experiment.record
-        output = predicted(experiment, theta, each.rows, trajectory)[0][record.at]
+        output = predicted(experiment, theta, each.rows, trajectory)[record.at]
         outputs.append(output)
         residuals.append(np.where(record.valid[record.at] > 0.0, record.measured - output, np.nan))
     links = tuple(each.links for each in equations)

@@ -143,11 +143,10 @@ def _of_sensors(
 ) -> np.ndarray:
     """(bins, q, q MODES) whitened derivative of the outputs by their gains' modes."""
     record = experiment.record
-    shown = predicted(experiment, theta, equations.rows, trajectory)[0]
+    shown = predicted(experiment, theta, equations.rows, trajectory)
     q = shown.shape[1]
     found = np.zeros((record.bins, q, q, MODES))
     for n in range(q):
         column = (equations.sampling.weight[:, n] * shown[:, n])[:, None] * modes
         np.add.at(found[:, n, n], record.bin[record.at], column[record.at])
-    found = found.reshape(record.bins, q, -1)
-    return record.whitened(found)
+    return record.whitened(found.reshape(record.bins, q, -1))
