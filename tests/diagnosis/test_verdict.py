@@ -15,6 +15,7 @@ from crash_estimator.core.diagnosis.report.left import ChannelLeft, Left
 from crash_estimator.core.diagnosis.report.ranking import Ranked
 from crash_estimator.core.diagnosis.report.tolerance import DEFAULT, Tolerance, tolerance_of
 from crash_estimator.core.diagnosis.report.verdict import Evidence, verdict_on
+from crash_estimator.core.diagnosis.residuals.in_band import InBand
 from crash_estimator.core.diagnosis.residuals.score_test import Drift
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.structure import Coefficient, ModelError
@@ -97,7 +98,8 @@ def test_evidence_is_weighed_in_noise_as_large_as_what_is_left_or_where_next_to_
     made_up = {
         "band_of_steps": None, "sized_models": (given, final), "free_run": SimpleNamespace(rms=1.0), "fit_of_all": None,
         "_drift_left_by": STANDS_STILL,
-        "step_of": SimpleNamespace(coefficient=5.0, std=1.0), "ranking_of": (LEADER,), "_removed_by_first_effect": 0.0,
+        "step_of": SimpleNamespace(coefficient=5.0, std=1.0), "ranking_of": (LEADER,),
+        "_explained_by_first_effect": 0.0,
     }  # fmt: skip
     for name, said in made_up.items():
         monkeypatch.setattr(report, name, lambda *given, said=said: said)
@@ -114,6 +116,17 @@ def test_evidence_is_weighed_in_noise_as_large_as_what_is_left_or_where_next_to_
         report._answer(None, path, DEFAULT, None)
     (evidence,) = found.value.args
     assert evidence.weighed == weighed
+
+
+@pytest.mark.parametrize(("effects", "share"), [
+    (["friction", "damping"], 0.75), (["friction", "friction"], 0.96), (["friction"], 0.75), ([], 0.0),
+])  # fmt: skip
+def test_what_the_first_effect_explains_is_its_share_in_the_band_wherever_it_is_missing(monkeypatch, effects, share):
+    """Models that leave 10, 5 and 2 m/s^2 below the class, of which the sensors' noise is next to none."""
+    models = [SimpleNamespace(fit=rms, residuals=None) for rms in (10.0, 5.0, 2.0)[: len(effects) + 1]]
+    monkeypatch.setattr(report, "in_band", lambda rms, residuals, cfc: InBand(rms, 0.0, 3.0, cfc))
+    added = [SimpleNamespace(effect=SimpleNamespace(name=name)) for name in effects]
+    assert report._explained_by_first_effect(models, added, 60) == pytest.approx(share)
 
 
 @pytest.mark.parametrize(("settled", "asked"), [(True, "as recorded"), (False, "as sized, in the sensors' noise")])

@@ -13,10 +13,11 @@ from ...effects.effect import Addition, Effect
 from ...structure import ModelError, Structure
 from ..observation.pace import at_its_own_pace
 from ..observation.record import ObservedRecord, observe
+from ..residuals.in_band import in_band
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import analyse, free_run, noise_floor
 from ..residuals.score_test import Drift, drift_of
-from ..selection.acceptance import settled, share_removed
+from ..selection.acceptance import settled
 from ..selection.assumptions import SelectionPath, first_believed, select, up_to
 from ..selection.fitted_model import Model
 from ..selection.rare_effects import common_effects
@@ -188,7 +189,7 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
     if 0 < sure < len(added) and not (final.white and drift.constant):
         return _answer(structure, up_to(path, sure), tolerance, zero)
     ranking, after = ranking_of(steps[0]), left_by(final, band)
-    by_first = _removed_by_first_effect(models, added)
+    by_first = _explained_by_first_effect(models, added, band)
     if zero:
         runs = [free_run(given.fit).rms, *runs]
         moved = time_zero_step(zero, models[0], (runs[0], runs[1]))
@@ -234,8 +235,9 @@ def _drift_left_by(path: SelectionPath, sized: Model) -> Drift:
     return drift_of(sized.fit._replace(problem=sized.fit.problem.on(path.records)))
 
 
-def _removed_by_first_effect(models: Sequence[Model], added: Sequence[Addition]) -> float:
-    """Share of the misfit; what one element lacks another may as well, then the two count as one."""
+def _explained_by_first_effect(models: Sequence[Model], added: Sequence[Addition], cfc: int | None) -> float:
+    """Share of the misfit in the band; what one element lacks another may as well, then the two count as one."""
     effects = [addition.effect.name for addition in added]
     alike = next((k for k, effect in enumerate(effects) if effect != effects[0]), len(effects))
-    return share_removed(models[0].residuals, models[alike].residuals)
+    given, left = (in_band(one.fit, one.residuals, cfc) for one in (models[0], models[alike]))
+    return left.share_explained(given)

@@ -23,7 +23,7 @@ class Evidence(NamedTuple):
     ranking: Sequence[Ranked]  # of the first step
     weighed: bool  # the evidence was taken in a noise as large as what is left
     certain: bool  # every coefficient that was added is beyond its standard deviation
-    by_first: float = 0.0  # share of the misfit that the first effect removes, wherever it is missing
+    by_first: float = 0.0  # share of the misfit in the band that the first effect explains, wherever it is missing
 
     @property
     def noise(self) -> bool:
