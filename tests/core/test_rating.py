@@ -1,5 +1,7 @@
 """The ISO/TS 18571 rating against a public implementation, and where its parts must be exact."""
 
+import resource
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -66,3 +68,12 @@ def test_what_cannot_be_rated_is_refused():
         rate(np.arange(20.0), np.full(20, np.nan))
     with pytest.raises(ValueError, match="reference that changes"):
         rate(np.ones(20), np.arange(20.0))
+
+
+def test_two_seconds_at_10_khz_need_no_gigabytes():
+    """A byte for each pair of samples within the band of a tenth: 80 MB; 8 bytes for every pair would be 3.2 GB."""
+    time = np.linspace(0.0, 2.0, 20_001)
+    pulse = np.sin(np.pi * time) * np.exp(-time)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert rate(pulse, 1.01 * pulse).overall > 0.97
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 500_000  # kB
