@@ -13,4 +13,10 @@ def force(motion: ElementMotion, speed: float):
     return np.tanh(motion.rate / speed)
 
 
-EFFECT = ElementForce("coulomb_friction", "N", {"speed": Shape("m/s", 0.01, 1.0, (0.1,), of_rate=True)}, force=force)
+EFFECT = ElementForce(
+    "coulomb_friction",
+    "N",
+    {"speed": Shape("m/s", 0.01, 1.0, (0.1,), of_rate=True)},
+    force=force,
+    of_rate_only=True,
+)

@@ -10,4 +10,4 @@ def force(motion: ElementMotion):
     return motion.rate
 
 
-EFFECT = ElementForce("viscous_damping", "N*s/m", force=force, doubles="damping")
+EFFECT = ElementForce("viscous_damping", "N*s/m", force=force, doubles="damping", of_rate_only=True)

@@ -220,8 +220,8 @@ def _slopes(term: Term, theta: np.ndarray, motion: ElementMotion):
     def faster(sign):
         return effect.force(motion._replace(rate=motion.rate + sign * SMALL_RATE), **shapes)
 
-    fx = (shifted(1.0) - shifted(-1.0)) / (2.0 * SMALL_CRUSH)
-    fv = (faster(1.0) - faster(-1.0)) / (2.0 * SMALL_RATE)
+    fx = 0.0 if effect.of_rate_only else (shifted(1.0) - shifted(-1.0)) / (2.0 * SMALL_CRUSH)
+    fv = 0.0 if effect.of_crush_only else (faster(1.0) - faster(-1.0)) / (2.0 * SMALL_RATE)
     return fx, fv, term.by_shapes(theta, lambda **shapes: effect.force(motion, **shapes))
 
 
