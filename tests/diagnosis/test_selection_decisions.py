@@ -119,6 +119,13 @@ def test_effects_are_added_one_by_one_as_long_as_they_gain_anything(monkeypatch,
     assert len(final.additions) == len(path) - 1 == (THRESHOLDS.most_steps if added is None else added)
 
 
+@pytest.mark.parametrize(("left", "gain", "added"), [(1.0, 9.0, 0), (1.0, 11.0, 1), (1.2, 9.0, 1), (1.2, 19.0, 1)])
+def test_beside_noise_a_first_effect_must_stand_out_from_none_and_a_second_one_more(monkeypatch, left, gain, added):
+    """The last two leave more than noise as given, and noise with the first one: what comes next must gain 20."""
+    path, final = one_by_one(monkeypatch, left, lambda before, fitted: step(before, gain))
+    assert len(final.additions) == len(path) - 1 == added
+
+
 @pytest.mark.parametrize(("left", "fitted"), [(10000.0, [True, True, False]), (100.0, [True] * 5)])
 def test_what_is_still_far_from_noise_is_not_searched_for_more_than_is_believed(monkeypatch, left, fitted):
     """What is left is looked at, and no candidate fitted to it."""

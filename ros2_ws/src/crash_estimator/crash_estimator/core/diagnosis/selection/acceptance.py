@@ -54,6 +54,11 @@ def explains_too_little(before, after, cfc: int | None) -> bool:
     return max(shares) < THRESHOLDS.least_share
 
 
-def needed_gain(adds_to_white: bool) -> float:
-    """Nats that the next addition must gain."""
-    return THRESHOLDS.gain_beyond_white if adds_to_white else THRESHOLDS.gain
+def needed_gain(white: bool, found: int) -> float:
+    """Nats that the next addition must gain; white: the model leaves noise already, found: effects added so far.
+
+    Where it does as given, that nothing is missing is a candidate too, and has to be told apart.
+    """
+    if not white:
+        return THRESHOLDS.gain
+    return THRESHOLDS.gain_beyond_white if found else THRESHOLDS.confounded

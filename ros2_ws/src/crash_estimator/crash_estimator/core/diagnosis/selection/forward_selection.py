@@ -73,7 +73,7 @@ def _one_by_one(
             # the candidate's fit has shown a better one of the model without it
             model, path = fair, path[:-1]
             continue
-        needed = needed_gain(bool(model.additions[present:]) and model.white)
+        needed = needed_gain(model.white, len(model.additions) - present)
         if done.best is None or done.best.gain < needed or len(path) > THRESHOLDS.most_steps:
             # where the noise had to be taken larger, the model before the step is the one fitted with it
             return without_the_superseded(magnitudes, path, done.before, present)

@@ -19,7 +19,9 @@ class Thresholds(NamedTuple):
     """Of each of two that are found at once: there are thousands of pairs, and some mimic anything small."""
     confounded: float = 10.0
     """Evidences closer than this do not tell two candidates apart. More than `gain`: Laplace's approximation and the
-    priors of two different laws leave some nats open between them."""
+    priors of two different laws leave some nats open between them. Nor a candidate from nothing, where the model as
+    given leaves white noise: of 600 judged cases of the second simulator two that lack nothing had 6.0 and 6.1, and one
+    that lacks something 6.6; of 20 of the first with the weakest effects or the loudest sensors none had less."""
     worth_fitting: float = 1.0
     """Of a screened gain."""
 
