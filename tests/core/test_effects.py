@@ -1,6 +1,7 @@
 """The vocabulary of effects: each one's physics, what it may act on, and a user's own."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -39,6 +40,19 @@ def middle(effect) -> dict[str, float]:
 def test_the_vocabulary_is_that_of_the_design():
     assert list(EFFECTS) == VOCABULARY
     assert all(name == effect.name for name, effect in EFFECTS.items())
+
+
+@pytest.mark.parametrize("effect", FORCES, ids=lambda effect: effect.name)
+def test_what_a_force_is_said_to_hang_on_alone_is_all_that_it_hangs_on(effect):
+    """As the diagnosis takes no derivative by the other; in every form, each with the middle of its shape constants."""
+    crush, rate = np.linspace(0.01, 0.3, 20), np.linspace(-5.0, 5.0, 20)
+    for form in effect.variants:
+        force = partial(effect.force, **{name: shape.starts[0] for name, shape in effect.shapes_of(form).items()})
+        given = force(motion(crush, rate))
+        hangs_on_rate = not np.array_equal(force(motion(crush, rate + 0.5)), given)
+        hangs_on_crush = not np.array_equal(force(motion(crush + 0.1, rate)), given)
+        assert not (effect.of_crush_only and hangs_on_rate) and not (effect.of_rate_only and hangs_on_crush)
+        assert hangs_on_rate or hangs_on_crush
 
 
 @pytest.mark.parametrize("name", DAMPERS)

@@ -66,14 +66,3 @@ def ranked(knot, knots):
                 found[link, t, side] = rank[number]
         touched[t] = count
     return found, order[:count], touched
-
-
-@njit(cache=True)
-def changing(kx, kv, dt, shortest):
-    """`changed` of a `Linear`; shortest: s by which a step is another than the one before."""
-    found = np.ones(len(dt), np.bool_)
-    for t in range(1, len(dt)):
-        found[t] = abs(dt[t] - dt[t - 1]) > shortest
-        for link in range(len(kx)):
-            found[t] |= kx[link, t] != kx[link, t - 1] or kv[link, t] != kv[link, t - 1]
-    return found

@@ -12,7 +12,7 @@ from ..parameterization.experiment import Experiment
 from ..parameterization.layout import DRIVEN, FREE, Layout
 from ..parameterization.terms import Link
 from .driven_motion import driven_by
-from .linear_system import Linear, Sampling, changing, ranked
+from .linear_system import Linear, Sampling, ranked
 from .link_force import LinkForce, link_force
 from .masses import attached_inertia, body_loads, mass_shares, masses
 from .outputs import sampling
@@ -147,10 +147,14 @@ def _linear_system(
     layout, record, _ = experiment
     g, n = len(record.time), len(forces)
     column, body, acts = (np.array(each) for each in zip(*actions.acting, strict=True))
-    kx, kv, kp = (_stacked([getattr(f, name) for f in forces], g) for name in ("kx", "kv", "kp"))
+    slopes = np.array([(f.kx, f.kv, f.kp) for f in forces], float).reshape(n, 3, g).transpose(1, 0, 2)
+    kx, kv, kp = np.ascontiguousarray(slopes)  # as one link's are already: for two layouts all would be compiled twice
     memories = [memory for f in forces for memory in f.memories]
     peaks = [f.loading & f.kp.any() for f in forces]  # none is kept that nothing hangs on
     knot, order, touched = ranked(np.array([f.knot for f in forces], np.int64).reshape(n, g, 2), layout.knots)
+    changed = np.ones(g, bool)
+    changed[1:] = (np.diff(kx) != 0.0).any(axis=0) | (np.diff(kv) != 0.0).any(axis=0)
+    changed[1:] |= np.abs(np.diff(record.dt)) > 1e-9 * record.step
     return Linear(
         dt=record.dt,
         ends=np.array([link.ends for link in layout.links]).reshape(-1, 2),
@@ -163,7 +167,7 @@ def _linear_system(
         loading=np.array(peaks, bool).reshape(n, g),
         knot=knot,
         weight=np.array([f.weight for f in forces], float).reshape(n, g, 2),
-        changed=changing(kx, kv, record.dt, 1e-9 * record.step),
+        changed=changed,
         observer=observer_rate,
         others=1 + len(actions.columns),
         column=column,

@@ -54,14 +54,12 @@ class _Inside(NamedTuple):
 class _Beside:
     """Forces beside the spring that act through the same gate: their sum, N, and its slopes by crush and rate."""
 
-    def __init__(self, gate: np.ndarray, slope: np.ndarray):
+    def __init__(self, gate: np.ndarray, slope: np.ndarray, nothing: np.ndarray):
         """gate (g,), and its change with the crush, 1/m."""
         self.gate, self.slope = gate, slope
-        self.force: np.ndarray | float = 0.0  # (g,) each, or a number: work is saved where nothing was added
-        self.px: np.ndarray | float = 0.0
-        self.pv: np.ndarray | float = 0.0
+        self.force = self.px = self.pv = nothing
 
-    def add(self, force: np.ndarray | float, px: np.ndarray | float, pv: np.ndarray | float) -> None:
+    def add(self, force: np.ndarray, px: np.ndarray | float, pv: np.ndarray | float) -> None:
         self.force, self.px, self.pv = self.force + force, self.px + px, self.pv + pv
 
 
@@ -94,7 +92,8 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
         found = Spring(*spring(law, crush, rate, dt, more, steeper))
     x, peak, on_line, at = found.x, found.peak, found.on_line, found.at
     static, kx, kp, weight, carries = found.static, found.kx, found.kp, found.weight, found.carries
-    factor, kv, force = np.ones(1), np.zeros_like(x), static
+    factor = np.ones_like(x)
+    kv, force = np.zeros_like(x), static
     if link.factors:
         for term in link.factors:
             c = theta[term.coefficient]
@@ -115,11 +114,10 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
     damping = theta[link.damping] if link.damping is not None else link.known_damping
     memories: list[Memory] = []
     if damping or link.damping is not None or link.parallel or link.remembering:
-        contact = _Beside(found.gate, found.gate_slope)
-        crushed = _Beside(found.crushed, found.crushed_slope) if law.unloads else contact
+        contact = _Beside(found.gate, found.gate_slope, np.zeros_like(x))
+        crushed = _Beside(found.crushed, found.crushed_slope, np.zeros_like(x)) if law.unloads else contact
         beside = crushed if outlasts(link.acts_when_spent) else contact
-        if damping:
-            beside.add(damping * rate, 0.0, damping)
+        beside.add(damping * rate, 0.0, damping)
         if link.damping is not None:
             parameters.append(link.damping)
             columns.append(beside.gate * rate)
