@@ -9,7 +9,10 @@ from crash_estimator.core.diagnosis import THRESHOLDS
 from crash_estimator.core.diagnosis.online import candidate_turns
 from crash_estimator.core.diagnosis.online.candidate_turns import OnlineState
 from crash_estimator.core.diagnosis.selection import assumptions, candidate_fits, forward_selection, selection_step
+from crash_estimator.core.diagnosis.selection.acceptance import needed_share
 from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
+from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.effects.effect import Addition
 
 MAGNITUDES = SimpleNamespace(structure=None)
 
@@ -21,26 +24,24 @@ def model(white=False, cost=1000.0, mean_square=50.0, evidence=0.0, additions=()
 
 
 def candidate(gain, key=("friction", "spring"), fitted=True):
-    addition = SimpleNamespace(key=key, effect=SimpleNamespace(coefficient_grid=lambda: ()))
-    return CandidateFit(addition, gain, SimpleNamespace(evidence=gain) if fitted else None)
+    return CandidateFit(SimpleNamespace(key=key), gain, SimpleNamespace(evidence=gain) if fitted else None)
 
 
-CARE = ["slowly", "other_variants", "anew", "from_motion"]
-MORE = ["from_model", "from_motion", "profile", "from_motion", "slowly", "anew"]
+CARE = ["slowly", "other_variants", "anew", "profile"]
 
 
 @pytest.mark.parametrize(
-    ("out_of_reach", "explains_most", "tried"),
-    [(False, False, CARE + MORE), (False, True, CARE + MORE), (True, False, CARE), (True, True, [])],
+    ("out_of_reach", "explains_most", "earlier", "tried"),
+    [(False, True, (), CARE), (True, False, (), CARE[:3]), (True, True, (), []), (True, False, ("one",), [])],
 )
-def test_where_noise_is_out_of_reach_only_care_is_taken_and_that_until_most_is_explained(
-    monkeypatch, out_of_reach, explains_most, tried
+def test_where_noise_is_out_of_reach_care_is_taken_with_a_first_effect_only_and_until_most_is_explained(
+    monkeypatch, out_of_reach, explains_most, earlier, tried
 ):
     called = []
 
     class Search:
         def __init__(self, *given):
-            self.begun = False
+            self.profile = lambda: called.append("profile")
 
         def __getattr__(self, name):
             return lambda *given: called.append(name)
@@ -57,17 +58,19 @@ def test_where_noise_is_out_of_reach_only_care_is_taken_and_that_until_most_is_e
     monkeypatch.setattr(candidate_fits, "candidates", lambda *given: ())
     monkeypatch.setattr(candidate_fits, "screen", lambda *given: [])
     monkeypatch.setattr(candidate_fits, "out_of_time", lambda: False)
-    assert candidate_fits.fit_candidates(None, {}, model(), thorough=True) == tried
+    assert candidate_fits.fit_candidates(None, {}, model(), thorough=True, earlier=earlier) == tried
 
 
-@pytest.mark.parametrize(("leaves_noise", "out_of_time", "looked_for"), [
-    (False, False, True), (True, False, False), (False, True, False),
+@pytest.mark.parametrize(("leaves_noise", "explained", "out_of_time", "looked_for"), [
+    (False, 0.9, False, True), (True, 0.9, False, False), (False, 0.96, False, False), (False, 0.9, True, False),
 ])  # fmt: skip
-def test_an_effect_on_two_elements_is_looked_for_only_where_one_leaves_more_than_noise_and_there_is_time(
-    monkeypatch, leaves_noise, out_of_time, looked_for
+def test_an_effect_on_two_elements_is_looked_for_only_where_one_does_not_explain_nearly_all_and_there_is_time(
+    monkeypatch, leaves_noise, explained, out_of_time, looked_for
 ):
     asked, given = [], model(white=True)
-    first = SimpleNamespace(leaves_noise=leaves_noise, candidates=[])
+    first = SimpleNamespace(leaves_noise=leaves_noise, candidates=[], best=candidate(500.0), before=given)
+    monkeypatch.setattr(forward_selection, "analyse", lambda fit: None)
+    monkeypatch.setattr(forward_selection, "share_removed", lambda before, after: explained)
     monkeypatch.setattr(forward_selection, "common_effects", lambda *given: {})
     monkeypatch.setattr(forward_selection, "out_of_time", lambda: out_of_time)
     monkeypatch.setattr(forward_selection, "two_of_one_effect", lambda *given: asked.append(given) or [])
@@ -88,6 +91,15 @@ def test_a_search_out_of_time_has_looked_at_all_candidates_once(monkeypatch):
     monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final, present: (path, final))
     path, _ = forward_selection._one_by_one(MAGNITUDES, {}, model(), [], 0)
     assert path == [step]
+
+
+def test_what_other_contacts_promise_of_a_path_is_worked_out_once(monkeypatch):
+    asked = []
+    with_contacts(monkeypatch, {"b": 3.0}, ends_early=True)
+    monkeypatch.setattr(assumptions, "_promised", lambda other, *given: asked.append(other) or 3.0 * (other == "b"))
+    monkeypatch.setattr(assumptions, "explains_most", lambda path: True)
+    assumptions._selected("stated", (), {})
+    assert asked[:3] == ["a", "b", "c"] and asked.count("b") == 1
 
 
 @pytest.mark.parametrize(("promised", "tried"), [({}, []), ({"b": 3.0}, ["b"]), ({"a": 2.0, "c": 3.0}, ["c", "a"])])
@@ -120,7 +132,8 @@ def with_contacts(monkeypatch, promised, noise_under="none", ends_early=False) -
         searched.append(structure)
         final = model(white=structure == noise_under)
         path = assumptions.SelectionPath(structure, [], final, 0, final.fit, (), 36)
-        return path._replace(whole=not (ends_early and elsewhere(path)))
+        begun = path._replace(whole=False)
+        return begun if ends_early and elsewhere(begun) else path
 
     for name, short in (("never_pulling", "a"), ("elastic_when_spent", "b"), ("all_when_spent", "c")):
         monkeypatch.setattr(assumptions, name, lambda structure, short=short: short)
@@ -166,6 +179,44 @@ def test_a_larger_noise_is_that_of_a_candidate_that_gains(monkeypatch):
     )
     (found,) = selection_step._noise_left_by(step, ())
     assert found.of == 300.0
+
+
+@pytest.mark.parametrize(("changes", "times"), [((1.0, 0.06, 0.06), 3), ((1.0, 0.04, 0.06), 1), ((0.01, 0.04), 1)])
+def test_the_noise_is_taken_larger_until_it_stays_as_it_is(monkeypatch, changes, times):
+    """However little it changes the first time: until then it was the sensors'."""
+    quietness, larger = 0.0, []
+
+    def louder(step, records):
+        nonlocal quietness
+        quietness -= changes[len(larger)]
+        return (SimpleNamespace(whitener=np.exp(quietness / 2) * np.eye(2)),)
+
+    def fitted(magnitudes, records, additions):
+        larger.append(records)
+        refitted = SimpleNamespace(**vars(model()) | {"records": records})
+        refitted.fit.problem, refitted.fit.point = SimpleNamespace(narrowed=lambda *given: None), None
+        refitted.refitted = lambda *given: refitted
+        return refitted
+
+    monkeypatch.setattr(selection_step, "_noise_left_by", louder)
+    monkeypatch.setattr(selection_step, "fit_model", fitted)
+    monkeypatch.setattr(selection_step, "better", lambda one, other: False)
+    monkeypatch.setattr(selection_step, "fit_candidates", lambda *given, **more: [])
+    monkeypatch.setattr(selection_step, "band_of_steps", lambda steps: None)
+    monkeypatch.setattr(selection_step, "evenly_fitted", lambda *given: None)
+    given = model()
+    given.fit.point = None
+    selection_step.weighed(None, {}, selection_step.SelectionStep(given, []))
+    assert len(larger) == times
+
+
+@pytest.mark.parametrize(("added", "share"), [
+    ([], THRESHOLDS.named_share), (["hysteresis"], THRESHOLDS.all_but_folds),
+    (["coulomb_friction", "hysteresis"], THRESHOLDS.named_share),
+])  # fmt: skip
+def test_a_law_that_bends_far_must_explain_nearly_all(added, share):
+    additions = [Addition(EFFECTS[name], "spring", variant=EFFECTS[name].variants[0]) for name in added]
+    assert needed_share(additions) == share
 
 
 @pytest.mark.parametrize(("white", "by_fit"), [(False, {2, 6, 10}), (True, {0, 2, 4, 6, 8, 10})])

@@ -54,6 +54,7 @@ LITTLE, DROWNED = left(0.009, 1.0), left(0.009, 0.13)
         ({"after": left(0.009, 2.0)}, DEFAULT, "effect_missing", True),
         ({"white": True, "drift": STANDS_STILL._replace(constant=True)}, DEFAULT, "effect_missing", True),
         ({"after": left(0.19, 9.0)}, DEFAULT, "unexplained", False),  # it explains a fifth
+        ({"needed": 0.97}, DEFAULT, "unexplained", False),  # it explains 0.96, by a law that bends far
         ({"drift": VARIES, "by_first": 0.9}, DEFAULT, "unexplained", False),
         ({"drift": VARIES, "by_first": 0.96}, DEFAULT, "effect_missing", False),
         ({"white": True}, DEFAULT, "unexplained", False),  # it looks like noise, and varies with time
@@ -99,7 +100,7 @@ def test_evidence_is_weighed_in_noise_as_large_as_what_is_left_or_where_next_to_
         "band_of_steps": None, "sized_models": (given, final), "free_run": SimpleNamespace(rms=1.0), "fit_of_all": None,
         "_drift_left_by": STANDS_STILL,
         "step_of": SimpleNamespace(coefficient=5.0, std=1.0), "ranking_of": (LEADER,),
-        "_explained_by_first_effect": 0.0,
+        "_explained_by_first_effect": 0.0, "needed_share": 0.75,
     }  # fmt: skip
     for name, said in made_up.items():
         monkeypatch.setattr(report, name, lambda *given, said=said: said)

@@ -188,10 +188,6 @@ class Effect:
         """Least coefficient that a fit admits."""
         return self.low
 
-    def coefficient_grid(self) -> Sequence[float]:
-        """Coefficients that a fit is to be started from as well; of most kinds none."""
-        return ()
-
     def extensions(self, structure: Structure, addition: "Addition") -> list["Addition"]:
         """The addition with further free parameters, which are tried once it is a candidate."""
         return []

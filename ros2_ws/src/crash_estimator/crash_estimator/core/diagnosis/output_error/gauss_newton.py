@@ -45,9 +45,6 @@ COARSE = 1e-3
 CIRCLES = 4
 """Iterations in which the cost finds no new least by as much: it goes around a kink of the forces."""
 
-MOTION_ERRS = 30.0
-"""Factor on the noise in an equation error, where the measured motion's own errors weigh more than the outputs'."""
-
 
 class Step(NamedTuple):
     """One linear solve."""
@@ -125,27 +122,14 @@ def advance(
 
 
 def equation_error_start(problem: OutputErrorProblem, held: Sequence[int] = ()) -> Point:
-    """Parameters that fit the forces along the measured motion, and that motion; held: they stay as they start."""
-    point, step = _along_the_measured_motion(problem, FROM_MEASURED_MOTION[0].inflate, held)
-    return Point(point.theta + step.delta, point.trajectories)
-
-
-def equation_error_left(problem: OutputErrorProblem) -> float:
-    """The cost that such a fit leaves, effects as they start; inf where the motion has no bounds."""
-    held = [term.coefficient for term in problem.layout.terms]
-    try:
-        return _along_the_measured_motion(problem, MOTION_ERRS, held)[1].after
-    except LinAlgError:
-        return np.inf
-
-
-def _along_the_measured_motion(problem: OutputErrorProblem, inflate: float, held: Sequence[int]) -> tuple[Point, Step]:
+    """The measured motion, and parameters that fit the forces along it; held: they stay as they start."""
     layout = problem.layout
     point = problem.measured(layout.start.copy())
     stays = shape_parameters(layout)
     stays[layout.common :] = True
     stays[list(held)] = True
-    return point, solve(layout, equation_error(problem, point), point.theta, inflate, stays)
+    step = solve(layout, equation_error(problem, point), point.theta, FROM_MEASURED_MOTION[0].inflate, stays)
+    return Point(point.theta + step.delta, point.trajectories)
 
 
 def shape_parameters(layout: Layout) -> np.ndarray:

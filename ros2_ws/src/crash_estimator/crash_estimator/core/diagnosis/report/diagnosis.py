@@ -17,7 +17,7 @@ from ..residuals.in_band import in_band
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import analyse, free_run, noise_floor
 from ..residuals.score_test import Drift, drift_of
-from ..selection.acceptance import settled
+from ..selection.acceptance import needed_share, settled
 from ..selection.assumptions import SelectionPath, first_believed, select, up_to
 from ..selection.fitted_model import Model
 from ..selection.rare_effects import common_effects
@@ -198,7 +198,8 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
     weighed = final.fit.problem.noise_is_inflated or after.share_explained(before) > THRESHOLDS.all_but_folds
     certain = all(abs(one.coefficient) > one.std for one in reports)
     many = len(added) or len(reports)  # a time zero is none of the effects that may be too many
-    evidence = Evidence(many, final.white, drift, before, after, ranking, weighed, certain, by_first)
+    needed = needed_share(added)
+    evidence = Evidence(many, final.white, drift, before, after, ranking, weighed, certain, by_first, needed)
     verdict = verdict_on(evidence, tolerance)
     if added and verdict.word == ADEQUATE:
         return _answer(structure, up_to(path, 0), tolerance, None)

@@ -24,6 +24,7 @@ class Evidence(NamedTuple):
     weighed: bool  # the evidence was taken in a noise as large as what is left
     certain: bool  # every coefficient that was added is beyond its standard deviation
     by_first: float = 0.0  # share of the misfit in the band that the first effect explains, wherever it is missing
+    needed: float = THRESHOLDS.named_share  # share that all of them must explain
 
     @property
     def noise(self) -> bool:
@@ -68,7 +69,7 @@ def _explains(evidence: Evidence) -> bool:
         0 < evidence.added <= THRESHOLDS.most_at_once
         and (evidence.weighed or evidence.white)
         and evidence.certain
-        and evidence.after.share_explained(evidence.before) > THRESHOLDS.named_share
+        and evidence.after.share_explained(evidence.before) > evidence.needed
     )
 
 

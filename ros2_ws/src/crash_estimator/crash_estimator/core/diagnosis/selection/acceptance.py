@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...effects.effect import Addition
 from ..observation.record import ObservedRecord
 from ..output_error.gauss_newton import Fit
 from ..residuals.in_band import in_band
@@ -62,3 +63,10 @@ def needed_gain(white: bool, found: int) -> float:
     if not white:
         return THRESHOLDS.gain
     return THRESHOLDS.gain_beyond_white if found else THRESHOLDS.confounded
+
+
+def needed_share(added: Sequence[Addition]) -> float:
+    """Of the misfit, that effects must explain to be believed where they leave more than noise, by the first of them: a
+    law with two shape constants bends far enough to follow most of what no vocabulary has."""
+    bends_far = any(len(one.effect.shapes_of(one.variant)) > 1 for one in added[:1])
+    return THRESHOLDS.all_but_folds if bends_far else THRESHOLDS.named_share

@@ -83,12 +83,16 @@ def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: 
     Whether others promise more is asked after a first step that leaves more than noise already: one effect after the
     other, to make up for contacts that are not so, takes ten times as long.
     """
+    asked: SelectionPath | None = None  # the last one that others were compared with, and what they promised
+    answers: dict[Callable[[Structure], Structure], float] = {}
 
     def promised(path: SelectionPath) -> dict[Callable[[Structure], Structure], float]:
         """Nats, by what can be assumed otherwise; without what promises nothing."""
-        others = {assumed: assumed(path.structure) for assumed in untried}
-        nats = {one: _promised(other, path, path.records) for one, other in others.items() if other not in tried}
-        return {one: promise for one, promise in nats.items() if promise > -np.inf}
+        nonlocal asked, answers
+        others = {one: other for one in untried if (other := one(path.structure)) not in tried}
+        if path is not asked:
+            asked, answers = path, {one: _promised(other, path, path.records) for one, other in others.items()}
+        return {one: answers[one] for one in others if answers[one] > -np.inf}
 
     tried: list[Structure] = []  # under which all has been looked for
     untried: list[Callable[[Structure], Structure]] = [never_pulling, elastic_when_spent, all_when_spent]

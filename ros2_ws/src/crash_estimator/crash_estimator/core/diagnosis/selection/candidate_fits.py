@@ -7,15 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects.effect import Addition, Effect
-from ..output_error.continuation import (
-    FROM_MEASURED_MOTION,
-    FROM_SIMULATION,
-    LARGE_NOISE,
-    SLOW_CONTACT,
-    SMALL_STEPS,
-    Schedule,
-)
-from ..output_error.gauss_newton import MOST_ITERATIONS, Fit, equation_error_left, fit
+from ..output_error.continuation import FROM_MEASURED_MOTION, FROM_SIMULATION, SLOW_CONTACT, SMALL_STEPS, Schedule
+from ..output_error.gauss_newton import MOST_ITERATIONS, Fit, fit
 from ..output_error.problem import OutputErrorProblem, Point, make_problem
 from ..output_error.profile_likelihood import closer, profile
 from ..parameterization.magnitudes import Magnitudes
@@ -51,7 +44,7 @@ def fit_candidates(
     additions = candidates(magnitudes, effects, model.additions)
     given = magnitudes, model.records, model.additions, additions, model.roughness
     by_fit = screen(*given, model.fit)
-    short, long = THRESHOLDS.shortlist, THRESHOLDS.long_list
+    short = THRESHOLDS.shortlist
     search = _Search(magnitudes, model, by_fit, least)
     if not fitted:
         return search.ranking()
@@ -68,28 +61,13 @@ def fit_candidates(
             bend = [a for a in bend if a.key not in tried]
         search.from_motion(Screened(a, 0.0, 0.0, 1.0) for a in bend)
     if thorough and not model.white:
-        gridded = [a for a in additions if a.effect.coefficient_grid()]
-        with_care = (
-            search.slowly,
-            search.other_variants,
-            lambda: search.anew(SMALL_STEPS),
-            lambda: search.from_motion(shortlist(by_motion, short) + shortlist(worth, short), SMALL_STEPS),
-        )
-        more_of_them = (
-            lambda: search.from_model(shortlist(by_motion, short) + shortlist(worth, long)),
-            lambda: search.from_motion(shortlist(worth, short) + shortlist(by_motion, long)),
-            search.profile,
-            lambda: search.from_motion([one for a in gridded for one in grid_starts(magnitudes, model, a)]),
-            search.slowly,
-            lambda: search.anew(LARGE_NOISE),
-        )
-        for harder in (*with_care, *more_of_them):
+        for harder in (search.slowly, search.other_variants, search.anew, search.profile):
             if out_of_time():
                 break
             if search.reached_the_floor():
                 search.rival_with_care()
                 break
-            if search.out_of_reach() and (harder in more_of_them or earlier or search.explains_most()):
+            if search.out_of_reach() and (harder == search.profile or earlier or search.explains_most()):
                 break
             harder()
     return search.ranking()
@@ -142,26 +120,28 @@ class _Search:
         if best.taken_from:
             self._fit(replace(best, taken_from=None))
 
-    def profile(self) -> None:
-        """Fit the likeliest that has a constant which says when its force ends, over that."""
-        likeliest = next((one for one in self.ranking() if one.addition.effect.profiled), None)
-        if likeliest is None:
-            return
-        starts = [one.addition for one in self.screened if one.addition.key == likeliest.addition.key]
-        look = profile(self._problem(starts[0]), starts[0], [addition.coefficient for addition in starts])
-        if look.fit.cost < self.model.fit.cost:
-            self._note(look.addition, closer(look))
-
     def slowly(self) -> None:
         """Fit the best ones on, with care for forces that jump."""
         for one in self._best():
             on = fit(one.fit.problem, one.fit.point, SLOW_CONTACT, most=2 * MOST_ITERATIONS)
             self._note(one.addition, on)
 
-    def anew(self, schedule: Schedule) -> None:
-        """Fit the best ones from the measured motion by another schedule."""
+    def anew(self) -> None:
+        """Fit the best ones from the measured motion in small steps."""
         for one in self._best():
-            self._fit(one.addition, None, schedule)
+            self._fit(one.addition, None, SMALL_STEPS)
+
+    def profile(self) -> None:
+        """Fit the likeliest that has a constant which says when its force ends, over that; closer, where it comes near
+        the best one."""
+        likeliest = next((one for one in self.ranking() if one.addition.effect.profiled), None)
+        if likeliest is None:
+            return
+        starts = [one.addition for one in self.screened if one.addition.key == likeliest.addition.key]
+        look = profile(self._problem(starts[0]), starts[0], [addition.coefficient for addition in starts])
+        taken_away = self.model.fit.cost - look.fit.cost
+        if taken_away > THRESHOLDS.named_share * (self.model.fit.cost - self.least):
+            self._note(look.addition, closer(look))
 
     def rival_with_care(self) -> None:
         """Fit another law on the same target that comes near the best one as carefully as that may need: what looks
@@ -232,17 +212,6 @@ def start_from(model: Model, problem: OutputErrorProblem, addition: Addition, sc
     if screened and not addition.effect.changes_law:
         theta[problem.layout.term(addition).coefficient] = screened.coefficient
     return problem.moved(theta, model.fit.trajectories)
-
-
-def grid_starts(magnitudes: Magnitudes, model: Model, addition: Addition) -> list[Screened]:
-    """No error yet, and the coefficients with which the forces along the measured motion fit best."""
-    shifted = [replace(addition, coefficient=c) for c in addition.effect.coefficient_grid()]
-
-    def misfit(one: Addition) -> float:
-        return equation_error_left(make_problem(magnitudes, model.records, [*model.additions, one], model.roughness))
-
-    starts = [addition, *sorted(shifted, key=misfit)[: THRESHOLDS.offset_starts]]
-    return [Screened(one, 0.0, one.coefficient or 0.0, 1.0) for one in starts]
 
 
 def _odds(addition: Addition, gain: float) -> float:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from ...effects.effect import Addition, Effect
 from ..parameterization.magnitudes import Magnitudes
+from ..residuals.residuals import analyse
 from .acceptance import better, explains_too_little, needed_gain, share_removed
 from .candidate_fits import CandidateFit
 from .even_fit import evenly_fitted
@@ -35,7 +36,7 @@ def forward_selection(
     present, common = len(given.additions), common_effects(magnitudes.structure, effects)
     alike: list[Pair] = []
     pair, step = (first, None) if isinstance(first, Pair) else (None, first)
-    if step and not (step.leaves_noise or out_of_time()):
+    if step and not (step.leaves_noise or _explains_nearly_all(step) or out_of_time()):
         alike = two_of_one_effect(magnitudes, given, step.candidates)
         pair = near_the_floor(alike, step.candidates)
     if pair:
@@ -83,6 +84,12 @@ def _one_by_one(
             return path, done.before
         model = larger
     return path, model
+
+
+def _explains_nearly_all(step: SelectionStep) -> bool:
+    """The best candidate does: what it leaves may be of another kind as well as of its own."""
+    left = step.best and share_removed(step.before.residuals, analyse(step.best.fit))
+    return bool(left and left > THRESHOLDS.all_but_folds)
 
 
 def _as_many_as_believed(model: Model, present: int) -> bool:

@@ -46,7 +46,7 @@ def two_of_one_effect(magnitudes: Magnitudes, model: Model, candidates: Sequence
             alike.setdefault(one.addition.effect.name, []).append(one)
     several = [places for places in alike.values() if len(places) > 1 and _likely(places[:1])]
     found = []
-    for first, *others in several[: THRESHOLDS.long_list]:
+    for first, *others in several[: THRESHOLDS.most_alike]:
         larger = added(magnitudes, model.records, model, first)[1]
         pairs = (_together(magnitudes, candidates, model, first, larger, o.addition) for o in others)
         found += [pair for pair in islice(pairs, THRESHOLDS.most_hosts) if pair]

@@ -84,6 +84,8 @@ def weighed(
         if out_of_time():
             break
         noisier = _noise_left_by(done, model.records)
+        if done.before is not model and _as_loud(noisier, done.before.records):
+            break
         before = fit_model(magnitudes, noisier, model.additions)
         problem = before.fit.problem
         for start in [done.before.fit, *(one.fit for one in done.candidates[:1] if one.fit)]:
@@ -108,7 +110,16 @@ def _noise_left_by(step: SelectionStep, records: Sequence[ObservedRecord]) -> tu
         return with_inflated_noise(records, bounded(step.before.residuals.residual, records))
     better = [one for one in step.candidates if one.fit and one.gain > THRESHOLDS.gain]
     noises = [with_inflated_noise(records, bounded(analyse(one.fit).residual, records)) for one in better]
-    return max(noises, key=lambda noise: np.linalg.slogdet(noise[0].whitener)[1])
+    return max(noises, key=_quietness)
+
+
+def _as_loud(one: Sequence[ObservedRecord], other: Sequence[ObservedRecord]) -> bool:
+    return abs(_quietness(one) - _quietness(other)) < THRESHOLDS.same_noise
+
+
+def _quietness(records: Sequence[ObservedRecord]) -> float:
+    """Logarithm of the determinant of what makes their noise white."""
+    return float(np.linalg.slogdet(records[0].whitener)[1])
 
 
 @may_diverge

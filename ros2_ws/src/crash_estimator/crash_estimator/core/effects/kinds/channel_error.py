@@ -8,10 +8,6 @@ import numpy as np
 from ..effect import Addition, Effect
 from ..estimator_model import ROUGHLY, coefficient_of, to_be_given, with_action
 
-OFFSETS = 10
-"""An offset bends the measured motion itself, from which fits start: so many are looked at, evenly over its limits."""
-
-
 DRIFTED_AFTER = 0.1
 """s after the impact, about a crash's length: a zero that drifts has by then moved by the coefficient."""
 
@@ -62,9 +58,3 @@ class ChannelError(Effect):
                 shown.append(body.force)
         shown += [name for body in structure.bodies if body.driven for name in body.acceleration]
         yield from (Addition(self, name, variant=variant) for name in shown for variant in self.variants)
-
-    def coefficient_grid(self):
-        if self.distorts != "offset":
-            return ()
-        step = (self.high - self.low) / OFFSETS
-        return tuple(self.low + step * (k + 0.5) for k in range(OFFSETS))
