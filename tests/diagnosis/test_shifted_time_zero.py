@@ -1,5 +1,7 @@
 """A test whose time zero is stated wrongly, brought to its onset, is diagnosed like the one that was not shifted."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import yaml
@@ -9,7 +11,8 @@ from crash_estimator.benchmarks.effects_judge import drawn
 from crash_estimator.benchmarks.effects_plan import case_of
 from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.core.diagnosis.observation.record import observe
-from crash_estimator.core.diagnosis.selection.time_zero import moved_by, onsets, sharpened
+from crash_estimator.core.diagnosis.selection import time_zero
+from crash_estimator.core.diagnosis.selection.time_zero import Shift, moved_by, onsets, sharpened
 from crash_estimator.model_file import ModelFile, load_model
 from crash_replay.bag import read_bag
 from crash_replay.onset import at_onset
@@ -86,10 +89,32 @@ def test_the_right_model_says_when_its_motion_began(structure):
         return [observe(structure, one) for one in moved_by(shifts, case.recordings)]
 
     begins = onsets(case.recordings, as_well=True)
-    found, gain = sharpened(begins, [one._replace(seconds=0.0) for one in begins], structure, [], observed)
+    found, gain = sharpened(begins, [one._replace(seconds=0.0) for one in begins], structure, [], observed, np.inf)
     off = [(one.seconds - t) / one.std for one, t in zip(found, true)]
     assert np.abs(off).max() < 3.0 and max(one.std for one in found) < 2e-4, (found, true)
     assert gain > 100.0, "nats, over the stated time zeros"
+
+
+@pytest.mark.parametrize(("found_leaves", "sharper_gains"), [(2.0, True), (0.5, False)])
+def test_a_sharper_time_zero_must_leave_less_than_all_that_was_found_without_it(
+    monkeypatch, found_leaves, sharper_gains
+):
+    """With the first effect the model leaves 1 m/s^2 from where the recording is taken, and 0.9 from its onset."""
+    onset = Shift(0, "test", 1e-3, 1e-4, 1e-4)
+    record = SimpleNamespace(bins=100, measured=np.zeros((1, 1)))
+    monkeypatch.setattr(time_zero, "measure_magnitudes", lambda *given: None)
+
+    def fitted(magnitudes, records, additions):
+        return SimpleNamespace(residuals=SimpleNamespace(rms=0.9 if records[0].at == onset.seconds else 1.0))
+
+    monkeypatch.setattr(time_zero, "fit_model", fitted)
+
+    def observed(shifts):
+        return [SimpleNamespace(**vars(record), at=shifts[0].seconds)]
+
+    stated = onset._replace(seconds=onset.seconds + 5e-5)
+    _, gain = sharpened([onset], [stated], None, [], observed, found_leaves)
+    assert (gain > 0.0) == sharper_gains
 
 
 @pytest.fixture(scope="module")

@@ -144,8 +144,9 @@ def _from_a_sharper_time_zero(
     structure: Structure, recordings: Sequence[Recording], effects: Mapping[str, Effect], found: SelectionPath,
     zero: TimeZero | None,
 ) -> tuple[SelectionPath, TimeZero | None, tuple[Shift, ...]] | None:  # fmt: skip
-    """What is found from where the motion with the first effect that was found begins: where that leaves noise, as what
-    was found does not, or does with more effects. Twice, as what came first may have been found for the time zero."""
+    """What is found from where the motion with the first effect that was found begins: where that leaves less than all
+    that was found, and then noise, as that does not, or does with more effects. Twice, as what came first may have been
+    found for the time zero."""
     begins = onsets(recordings, as_well=True)
     used = {shift.recording: shift.seconds for shift in zero.shifts} if zero else {}
     shifts = tuple(shift._replace(seconds=used.get(shift.recording, 0.0)) for shift in begins)
@@ -157,10 +158,11 @@ def _from_a_sharper_time_zero(
 
     path = found
     for _ in range(2 if most > 0 else 0):
-        if analyse(path.as_recorded).mean_square >= THRESHOLDS.real_structure or out_of_time():
+        left = analyse(path.as_recorded)
+        if left.mean_square >= THRESHOLDS.real_structure or out_of_time():
             return None
         additions = (*path.final.additions[: path.present], *path.added[:1])
-        shifts, gain = sharpened(begins, shifts, path.structure, additions, observed)
+        shifts, gain = sharpened(begins, shifts, path.structure, additions, observed, left.rms)
         if not gain > THRESHOLDS.gain:
             return None
         path = first_believed(select(structure, observed(shifts), effects))

@@ -98,9 +98,10 @@ def time_zero_wrong(
 @may_diverge
 def sharpened(
     onsets: Sequence[Shift], taken: Sequence[Shift], structure: Structure, additions: Sequence[Addition],
-    observed: Callable[[Sequence[Shift]], Sequence[ObservedRecord]],
+    observed: Callable[[Sequence[Shift]], Sequence[ObservedRecord]], left: float,
 ) -> tuple[tuple[Shift, ...], float]:  # fmt: skip
-    """The likeliest shifts for the structure with some additions; and what they gain over those `taken`, in nats.
+    """The likeliest shifts for the structure with some additions; and what they gain, in nats, over those `taken` with
+    all that was found so, which left so much (rms, m/s^2).
 
     The logarithm of the likelihood is that of what is left from there on, in noise as large as that, and of the onsets,
     each with its standard deviation: free curves may begin before there is any force, and do not tell when.
@@ -112,19 +113,23 @@ def sharpened(
     """
     bins = sum(record.bins * record.measured.shape[1] for record in observed(taken))
 
+    def of_both(shifts: tuple[Shift, ...], rms: float) -> float:
+        """Twice the negative logarithm of the likelihood of what is left and of the onsets, less constants."""
+        off = sum(((one.seconds - onset.seconds) / onset.std) ** 2 for one, onset in zip(shifts, onsets, strict=True))
+        return 2.0 * bins * float(np.log(rms)) + off if np.isfinite(rms) else np.inf
+
     @cache
     def unlikely(shifts: tuple[Shift, ...]) -> float:
-        """Twice the negative logarithm of the likelihood, less constants."""
-        pairs = list(zip(shifts, onsets, strict=True))
+        """The same, with the additions from there on."""
+        pairs = zip(shifts, onsets, strict=True)
         if any(abs(one.seconds - onset.seconds) > abs(onset.seconds) + FARTHEST * onset.std for one, onset in pairs):
             return np.inf
         try:
             records = observed(shifts)
         except ModelError:  # too little is left from there on
             return np.inf
-        rms = fit_model(measure_magnitudes(structure, records, CELLS), records, additions).residuals.rms
-        off = sum(((one.seconds - onset.seconds) / onset.std) ** 2 for one, onset in pairs)
-        return 2.0 * bins * float(np.log(rms)) + off if np.isfinite(rms) else np.inf
+        found = fit_model(measure_magnitudes(structure, records, CELLS), records, additions)
+        return of_both(shifts, found.residuals.rms)
 
     def moved(shifts: tuple[Shift, ...], which: Sequence[int], samples: int) -> tuple[Shift, ...]:
         by = [samples * one.period if k in which else 0.0 for k, one in enumerate(shifts)]
@@ -148,7 +153,7 @@ def sharpened(
         bent[i, j] = bent[j, i] = unlikely(moved(best, (i, j), 1)) - later[i] - later[j] + least
     stds = _stds(0.5 * bent, [onset.std / onset.period for onset in onsets])
     found = tuple(one._replace(std=one.period * max(BETWEEN, std)) for one, std in zip(best, stds, strict=True))
-    return found, 0.5 * (unlikely(tuple(taken)) - least)
+    return found, 0.5 * (min(unlikely(tuple(taken)), of_both(tuple(taken), left)) - least)
 
 
 def _stds(precision: np.ndarray, otherwise: Sequence[float]) -> Sequence[float]:
