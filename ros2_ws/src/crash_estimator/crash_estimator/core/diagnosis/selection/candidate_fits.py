@@ -36,7 +36,7 @@ def fit_candidates(
 ) -> list[CandidateFit]:  # fmt: skip
     """All candidates, best first; one for each effect and target.
 
-    thorough: try more of them, and harder, where none of the most likely ones leaves white noise. in_other_noise: what
+    thorough: fit the best of them harder, where none of the most likely ones leaves white noise. in_other_noise: what
     was found with other noise, best first; its best fits are gone on from. earlier: what was found for the models
     before this one. fitted: not only screened. least: cost that another explanation leaves; what stays far above it is
     not fitted to the end.
