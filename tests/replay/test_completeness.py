@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crash_replay.attendance import Attendance, Word
-from crash_replay.completeness import SILENT_FOR, Completeness, Pass
+from crash_replay.completeness import SILENT_FOR, Completeness, Pass, Written
 from crash_replay.numbers import Numbers
 from crash_replay.recorded_topics import FORCES, PARAMETERS, RANKING, RESIDUALS, SAMPLES, About, Choice
 
@@ -208,6 +208,73 @@ def test_what_was_not_to_be_recorded_is_not_missing():
     assert graph.account.missing() == ["no topic fits test (parameter topics)"]
     graph.account.found("/test", "crash_msgs/msg/TestInfo")
     assert graph.account.missing() == []
+
+
+def with_channels(*found: str) -> Graph:
+    """A whole recording of a test with two channels, one sample each ms; of the channels nothing came yet."""
+    graph = whole(Choice(topics=["*"], exclude=["*_vy"]))
+    graph.account.begin_test(100, ["/channels/rib_ay", "/channels/rib_vy", "/channels/spine_ay"])
+    graph.replay()
+    graph.write(0, 100)
+    graph.account.finals["/diagnosis"] = 0
+    for topic in found:
+        graph.account.found(topic, "geometry_msgs/msg/AccelStamped")
+    return graph
+
+
+def test_a_channel_must_be_there_at_the_instants_of_the_samples():
+    """One that was found only when samples had begun to come was recorded from there on, and said to be complete."""
+    graph = with_channels("/channels/rib_ay", "/channels/spine_ay")
+    channels = graph.account.channels
+    for number in range(6, 40):
+        channels.add("/channels/rib_ay", 1_000_000 * number)  # before the samples: both ways lead here
+    channels.add_samples(0, range(0, 100_000_000, 1_000_000))
+    for number in range(100):
+        channels.add("/channels/spine_ay", 1_000_000 * number)
+    for number in range(40, 99):
+        channels.add("/channels/rib_ay", 1_000_000 * number)
+    channels.add("/channels/rib_vy", 0)  # not asked for
+    assert graph.account.missing() == ["/channels/rib_ay: 93 of 100, without 0 to 5, 99"]
+    graph.replay(first=10, sent=99)
+    assert graph.account.missing() == []
+
+
+def test_of_channels_nothing_is_said_where_the_samples_are_not_recorded_beside_them():
+    graph = with_channels("/channels/rib_ay")
+    graph.account.channels.add("/channels/rib_ay", 0)
+    assert graph.account.missing() == []
+
+
+def test_the_test_and_its_channels_are_to_come_until_they_are_found():
+    graph = Graph(Choice(topics=["*"]), total=0)
+    assert not graph.account.channels_to_come()  # no test was found: whoever publishes samples may have none
+    graph.account.found("/test", "crash_msgs/msg/TestInfo")
+    assert graph.account.channels_to_come()
+    graph.account.begin_test(100, ["/channels/rib_ay"])
+    assert graph.account.channels_to_come()
+    graph.account.found("/channels/rib_ay", "geometry_msgs/msg/AccelStamped")
+    assert not graph.account.channels_to_come()
+
+
+def test_what_was_asked_for_and_then_comes_by_itself_comes_late():
+    written = Written()
+    written.add(About(0, 0, 10))
+    written.fetched.add(4, 8)
+    assert written.came_late(About(0, 4, 1)) and written.came_late(About(0, 5, 3))
+    assert not written.came_late(About(0, 7, 2)) and not written.came_late(About(1, 4, 1))
+    written.add(About(1, 0, 1))
+    assert not written.came_late(About(1, 4, 1))
+
+
+def test_of_another_model_the_same_estimates_do_not_come_late():
+    graph = whole()
+    graph.account.revise("/kalman", 0)
+    written = graph.account.of("/kalman/block/parameters")
+    written.fetched.add(4, 8)
+    graph.account.revise("/kalman", 0)
+    assert written.came_late(About(0, 4, 1))
+    graph.account.revise("/kalman", 1)
+    assert not written.came_late(About(0, 4, 1))
 
 
 def test_without_a_test_nobody_knows():

@@ -11,9 +11,9 @@ from threading import Event, Thread
 
 import pytest
 from crash_msgs.msg import Attendance as Word
-from crash_msgs.msg import Ranking
+from crash_msgs.msg import Ranking, ReplayState
 from crash_msgs.srv import Step
-from helpers_record import Estimator, Record, messages, says_of_itself
+from helpers_record import Estimator, Record, messages, messages_so_far, says_of_itself
 from helpers_replay import Listener, Replay, environment, wait_until
 from helpers_waiting import PATIENCE
 
@@ -120,6 +120,23 @@ def test_what_was_not_replayed_is_missing_and_the_status_says_so(bag, tmp_path):
     assert errors.endswith("; /samples: 3 of 40, without 3 to 39; /replay has left")
     assert messages(file)["/samples"] == 3
     assert says_of_itself(file) == {"complete": "false", "missing": errors.partition(" topics; ")[2]}
+
+
+def test_a_channel_that_was_not_heard_from_the_beginning_is_missing_and_the_status_says_so(bag, tmp_path):
+    """Samples that were sent before it came are asked for; of channels there is nothing to ask."""
+    file = tmp_path / "e.mcap"
+    with Listener() as listener:
+        with Replay(bag, start_paused=True, keep_alive=True, wait_for=1, wait_timeout=PATIENCE) as replay:
+            wait_until(lambda: listener.states and listener.states[-1].state == ReplayState.PAUSED)
+            assert listener.call(Step, "step", n=3).success
+            with Record(file, topics="[test, samples, channels/rib_ay]", wait_for=0) as record:
+                wait_until(lambda: listener.states[-1].subscribers == 2)
+                assert listener.call(Step, "step", n=37).success
+                wait_until(lambda: messages_so_far(file)["/samples"] == 38)  # the first three in one message
+                replay.interrupt()
+                status, output, errors = record.end()
+    assert (status, output) == (1, "")
+    assert errors.endswith("; /channels/rib_ay: 37 of 40, without 0 to 2; /replay has left")
 
 
 def test_what_an_estimator_said_and_did_not_come_is_asked_for_and_what_it_cannot_give_is_named(bag, tmp_path):

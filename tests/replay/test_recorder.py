@@ -12,7 +12,7 @@ from rclpy.serialization import serialize_message
 
 from crash_replay.bag import read_bag, write_bag
 from crash_replay.message_types import encode_test
-from crash_replay.recorded_topics import NUMBERED, About, about, sayer_of, stamp_of, unreadable
+from crash_replay.recorded_topics import NUMBERED, About, about, instants_of, sayer_of, stamp_of, unreadable
 from crash_replay.recorder import Heard, Recorder
 from crash_replay.recording import RecordingError
 from crash_replay.ros_messages import samples_to_msg, time_zero_ns
@@ -43,6 +43,8 @@ def test_what_a_message_begins_with_is_read_in_both_byte_orders():
         for frame in ("", "abc", "abcd"):
             message.header.frame_id = frame
             assert about(serialize_message(message)) == About(7, 2**40, 3)
+            message.header.stamp.sec, message.header.stamp.nanosec = 5, 999_999_999
+            assert instants_of(serialize_message(message)) == [5_999_999_999, 6_000_000_000, 6_000_000_001]
     assert sayer_of(serialize_message(msg.Attendance(node="/kalman", role="estimator"))) == "/kalman"
     big = bytes([0, 0, 0, 0]) + (5).to_bytes(4, "big") + (6).to_bytes(4, "big")
     assert stamp_of(big) == 5_000_000_006

@@ -1,14 +1,16 @@
 """Whether a recording holds what the test has and what the nodes have said of it. No ROS here.
 
 Of the last pass every sample that was sent must be there, of each estimator every estimate of these samples, and of a
-diagnosis its final answer. Where the replay ended before its pass did, the whole test must be there from some pass.
+diagnosis its final answer. Where the replay ended before its pass did, the whole test must be there from some pass; so
+must each channel that is recorded, at the instants of the samples beside it.
 """
 
+from collections.abc import Collection, Iterable
 from typing import NamedTuple
 
 from .attendance import GONE, Attendance, State
 from .numbers import Numbers, Span
-from .recorded_topics import NUMBERED, SAMPLES, About, Choice
+from .recorded_topics import NUMBERED, SAMPLES, TEST, About, Choice
 
 ESTIMATOR, DIAGNOSIS = "estimator", "diagnosis"
 ESTIMATES = {"block/parameters": "ParametersBlock", "block/residuals": "ResidualsBlock", "forces": "Forces"}
@@ -37,6 +39,7 @@ class Written:
         self.last = Numbers()  # in this run
         self.all = Numbers()  # in all of this test
         self.given_up, self.why = Numbers(), ""  # in this run: cannot be had, and why
+        self.fetched = Numbers()  # in this run: asked for and given
 
     def add(self, about: About) -> None:
         self._begin(about.run)
@@ -46,7 +49,7 @@ class Written:
     def _begin(self, run: int) -> None:
         """A replay that was started again counts its passes from 0 again."""
         if run != self.run:
-            self.run, self.last, self.given_up, self.why = run, Numbers(), Numbers(), ""
+            self.run, self.last, self.given_up, self.why, self.fetched = run, Numbers(), Numbers(), "", Numbers()
 
     def lacks(self, of: Pass) -> list[Span]:
         """Of the pass, up to what was sent."""
@@ -54,6 +57,10 @@ class Written:
 
     def lacks_some(self, about: About) -> bool:
         return about.run != self.run or bool(self.last.missing(about.number, about.number + about.count))
+
+    def came_late(self, about: About) -> bool:
+        """Whether these have been asked for, and were given, before they came by themselves."""
+        return about.run == self.run and not self.fetched.missing(about.number, about.number + about.count)
 
     def give_up(self, run: int, span: Span, why: str) -> None:
         self._begin(run)
@@ -67,12 +74,45 @@ class Written:
         return lacking
 
 
+class ChannelsWritten:
+    """Which samples the messages of channels are of: they say an instant, the samples beside them its number."""
+
+    def __init__(self, topics: Collection[str] = ()):
+        """topics: of the test's channels that are to be recorded."""
+        self.topics = topics
+        self.numbers: dict[int, int] = {}  # of the samples, by their instants in ns
+        self.written = {topic: Numbers() for topic in topics}
+        self.early: dict[str, list[int]] = {topic: [] for topic in topics}  # instants whose samples had not come
+
+    def add_samples(self, first: int, instants: Iterable[int]) -> None:
+        for number, instant in enumerate(instants, start=first):
+            self.numbers[instant] = number
+
+    def add(self, topic: str, instant: int) -> None:
+        if topic not in self.written:  # of another test
+            return
+        if (number := self.numbers.get(instant)) is None:
+            self.early[topic].append(instant)
+        else:
+            self.written[topic].add(number, number + 1)
+
+    def lacks(self, topic: str, of: Pass) -> Numbers:
+        """Samples of the pass that came, and whose value in this channel did not."""
+        early, self.early[topic] = self.early[topic], []
+        for instant in early:
+            self.add(topic, instant)
+        written = self.written[topic]
+        came = sorted(number for number in self.numbers.values() if of.first <= number < of.sent)
+        return Numbers((number, number + 1) for number in came if written.reach(number) == number)
+
+
 class Completeness:
     """Keeps account of a recording."""
 
     def __init__(self, choice: Choice, others: Attendance, samples_topic: str = "/samples"):
         self.choice, self.others, self.samples_topic = choice, others, samples_topic
         self.written: dict[str, Written] = {}  # by topic, of the types NUMBERED
+        self.channels = ChannelsWritten()
         self.types: dict[str, str] = {}  # of the topics that were found
         self.finals: dict[str, int] = {}  # by diagnosis, run of its last final ranking
         self.revisions: dict[str, int] = {}  # by estimator, of its model
@@ -85,9 +125,23 @@ class Completeness:
         if kind in NUMBERED:
             self.written.setdefault(topic, Written())
 
-    def begin_test(self, total: int) -> None:
+    def begin_test(self, total: int, channels: Collection[str] = ()) -> None:
+        """channels: their topics, of which those that are not to be recorded are passed over."""
         self.total, self.replayed, self.finals = total, None, {}
         self.written = {topic: Written() for topic in self.written}
+        self.channels = ChannelsWritten([topic for topic in channels if self.choice.wants_channel(topic)])
+
+    def revise(self, node: str, revision: int) -> None:
+        """An estimator's model may have become another one: what it says of the same samples then is not the same."""
+        if revision != self.revisions.get(node):
+            for topic in self.estimates(node):
+                self.of(topic).fetched = Numbers()
+        self.revisions[node] = revision
+
+    def channels_to_come(self) -> bool:
+        """Whether the test has not come yet, or a channel of it that is to be recorded has not been found."""
+        test_to_come = TEST in self.types.values() and not self.total
+        return test_to_come or not self.channels.written.keys() <= self.types.keys()
 
     def of(self, topic: str) -> Written:
         return self.written.setdefault(topic, Written())
@@ -145,6 +199,8 @@ class Completeness:
         missing = [self._missing_of(topic, of, "") for topic in self.samples()]
         if not self.samples() and self.replayed and self.choice.wants(self.samples_topic, SAMPLES):
             missing.append("samples: the topic was not found")
+        for topic in sorted(self.channels.written.keys() & self.types.keys()):
+            missing.append(_lacking(topic, self.channels.lacks(topic, of), of))
         for node in self.nodes(ESTIMATOR):
             missing += [self._missing_of(topic, of, self._why(node)) for topic in self.estimates(node)]
         for node in self.nodes(DIAGNOSIS) if of.finished and of.sent == of.total else []:
@@ -156,14 +212,8 @@ class Completeness:
 
     def _missing_of(self, topic: str, of: Pass, why: str) -> str:
         written = self.of(topic)
-        lacking = written.lacks_of_test(of)
-        if not len(lacking):
-            return ""
-        needed = of.sent - of.first if of.finished else of.total
-        shown = Numbers(lacking.spans[:MOST_SPANS])
-        more = ", ..." if len(lacking.spans) > MOST_SPANS else ""
         because = "; ".join(dict.fromkeys(filter(None, [why, written.why])))
-        return f"{topic}: {needed - len(lacking)} of {needed}, without {shown}{more}{_because(because)}"
+        return _lacking(topic, written.lacks_of_test(of), of, because)
 
     def _why(self, node: str) -> str:
         if (word := self.others.word(node)) is None:
@@ -171,6 +221,16 @@ class Completeness:
         state = self.others.state(node)
         how = self.others.how(node, state) if state in (State.LEFT, State.KILLED, State.SILENT) else ""
         return "; ".join(filter(None, [f"{node} {how}" if how else "", word.reason]))
+
+
+def _lacking(topic: str, lacking: Numbers, of: Pass, why: str = "") -> str:
+    """A line on what a topic lacks of a pass, "" where it lacks nothing."""
+    if not len(lacking):
+        return ""
+    needed = of.sent - of.first if of.finished else of.total
+    shown = Numbers(lacking.spans[:MOST_SPANS])
+    more = ", ..." if len(lacking.spans) > MOST_SPANS else ""
+    return f"{topic}: {needed - len(lacking)} of {needed}, without {shown}{more}{_because(why)}"
 
 
 def _because(reason: str) -> str:

@@ -150,3 +150,4 @@ class Fetching:
         if self.account.lacks(topic, about):
             kind = f"crash_msgs/msg/{type(message).__name__}"
             self.write(Heard(topic, kind, latched=False), serialize_message(message))
+            self.account.of(topic).fetched.add(about.number, about.number + about.count)

@@ -16,12 +16,22 @@ from .recorder import Heard
 
 SETTLED = 0.3
 """s without a new topic after which those that are heard reach this node."""
+TO_COME_WITHIN = 10.0
+"""s without a new topic after which one that is known of is not waited for any more: who said so may be a recording."""
 
 
 class Listening:
-    def __init__(self, node: Node, choice: Choice, wait_for: int, hear: Callable[[Heard, bytes], None]):
-        """wait_for: estimators to hear before the samples; hear: called with each message, serialized."""
-        self.node, self.choice, self.wait_for, self.hear = node, choice, wait_for, hear
+    def __init__(
+        self,
+        node: Node,
+        choice: Choice,
+        wait_for: int,
+        hear: Callable[[Heard, bytes], None],
+        more_to_come: Callable[[], bool] = lambda: False,
+    ):
+        """wait_for: estimators to hear before the samples; hear: called with each message, serialized; more_to_come:
+        whether a topic is known of that has not been found yet."""
+        self.node, self.choice, self.wait_for, self.hear, self.more_to_come = node, choice, wait_for, hear, more_to_come
         self.heard: dict[str, Heard] = {}  # by name
         self.newest = 0.0  # monotonic s, when a topic was found
 
@@ -38,14 +48,18 @@ class Listening:
 
     def settled(self) -> bool:
         estimators = sum(topic.type == PARAMETERS and topic.own for topic in self.heard.values())
-        return estimators >= self.wait_for and time.monotonic() - self.newest > SETTLED
+        quiet = time.monotonic() - self.newest > SETTLED
+        return estimators >= self.wait_for and quiet and not self._waits_for_more()
 
     def ready(self) -> bool:
         """Whether all that is to be recorded reaches this node from now on."""
         samples = self.node.resolve_topic_name("samples")
         if self.choice.wants(samples, SAMPLES):
-            return samples in self.heard
+            return samples in self.heard and not self._waits_for_more()
         return self.settled()
+
+    def _waits_for_more(self) -> bool:
+        return time.monotonic() - self.newest < TO_COME_WITHIN and self.more_to_come()
 
     def _subscribe(self, name: str, kind: str, own: bool) -> Heard:
         qos = self._qos(name)

@@ -24,7 +24,7 @@ from .namespaces import namespace_of
 from .node_parameters import declare_parameters, names_in
 from .numbers import Numbers
 from .record_parameters import PARAMETERS
-from .recorded_topics import DIAGNOSTICS, NUMBERED, Choice, about, unreadable
+from .recorded_topics import CHANNELS, DIAGNOSTICS, NUMBERED, Choice, about, instants_of, stamp_of, unreadable
 from .recorder import Heard, Recorder
 from .ros_runtime import run
 from .said import say
@@ -59,7 +59,7 @@ class RecordNode(Node):
         self.recorder = opened(asked["to"])
         self.attending = Attending(self, "record", self._progress)
         self.account = Completeness(choice, self.attending.others, self.resolve_topic_name("samples"))
-        self.listening = Listening(self, choice, asked["wait_for"], self._hear)
+        self.listening = Listening(self, choice, asked["wait_for"], self._hear, self._channels_to_come)
         self.fetching = Fetching(self, self.account, self._hear)
         self.replayed = self.all_said = False  # a replay is or was there; nothing more is to be expected
         self.last = self.looked = time.monotonic()  # when a message came; when it was looked
@@ -78,6 +78,8 @@ class RecordNode(Node):
             return self.get_logger().error(f"{topic.name}: {why}: left out", throttle_duration_sec=10.0)
         if topic.type == DIAGNOSTICS and not said_within(data, self.get_namespace()):
             return
+        if topic.own and topic.type in NUMBERED and self.account.of(topic.name).came_late(about(data)):
+            return
         try:
             new = self.recorder.hear(topic, data)
         except OSError as error:
@@ -93,15 +95,21 @@ class RecordNode(Node):
     def _take_account(self, topic: Heard, data: bytes) -> None:
         if topic.type in NUMBERED:
             self.account.of(topic.name).add(about(data))
+            if topic.name == self.account.samples_topic and self.account.channels.topics:
+                self.account.channels.add_samples(about(data).number, instants_of(data))
+        elif topic.type in CHANNELS:
+            self.account.channels.add(topic.name, stamp_of(data))
         elif topic.type == "crash_msgs/msg/TestInfo":
-            self.account.begin_test(deserialize_message(data, TestInfo).samples)
+            test = deserialize_message(data, TestInfo)
+            channels = [self.resolve_topic_name(f"channels/{channel.name}") for channel in test.channels]
+            self.account.begin_test(test.samples, channels)
         elif topic.type == "crash_msgs/msg/Ranking":
             ranking = deserialize_message(data, Ranking)
             if ranking.final:
                 self.account.finals[topic.name.removesuffix("/ranking")] = ranking.run
         elif topic.type == "crash_msgs/msg/EstimatorState":
             state = deserialize_message(data, EstimatorState)
-            self.account.revisions[topic.name.removesuffix("/state")] = state.revision
+            self.account.revise(topic.name.removesuffix("/state"), state.revision)
 
     # what is said of it
 
@@ -145,6 +153,10 @@ class RecordNode(Node):
             finished = state.state == ReplayState.FINISHED
             self.account.replayed = Pass(state.run, state.first, state.number, state.total, finished)
             self.account.known_to_replay = {one.node: one.role for one in state.listeners if one.state not in GONE}
+
+    def _channels_to_come(self) -> bool:
+        """Whether a replay is there whose test, or a channel of it that is to be recorded, is still to come."""
+        return self.count_publishers("replay_state") > 0 and self.account.channels_to_come()
 
     def _replay_is_gone(self) -> bool:
         others = self.attending.others

@@ -50,6 +50,10 @@ class Choice(NamedTuple):
             chosen = kind not in CHANNELS | NAMED | {CLOCK}
         return chosen and not (self.fits(name, self.exclude) or _found(self.exclude_regex, name))
 
+    def wants_channel(self, name: str) -> bool:
+        """Of the recorder's own namespace, whatever type carries it."""
+        return any(self.wants(name, kind) for kind in CHANNELS)
+
     def in_vain(self, names: Iterable[str]) -> list[str]:
         """Those of `topics` that no recorded topic fits."""
         names = list(names)
@@ -80,13 +84,26 @@ class About(NamedTuple):
 
 def about(data: bytes) -> About:
     """Of a message of one of the types NUMBERED: stamp, frame, run, number, time_ns (plain CDR, see cdr.py)."""
+    return _about(data)[0]
+
+
+def instants_of(data: bytes) -> list[int]:
+    """ns, as in the stamps of the channels' messages, of the samples that such a message is about."""
+    (_, _, count), at = _about(data)
+    times = struct.unpack_from(f"{order(data)}{count}q", data, at)
+    return [stamp_of(data) + time - times[0] for time in times]
+
+
+def _about(data: bytes) -> tuple[About, int]:
+    """With where its time_ns begin."""
     (text,) = struct.unpack_from(f"{order(data)}I", data, BEGINNING + 8)
     at = _aligned(BEGINNING + 12 + text, 4)
     (run,) = struct.unpack_from(f"{order(data)}I", data, at)
     at = _aligned(at + 4, 8)
     number, count = struct.unpack_from(f"{order(data)}QI", data, at)
-    _expect(data, at + 12 + 8 * count)
-    return About(run, number, count)
+    at = _aligned(at + 12, 8)
+    _expect(data, at + 8 * count)
+    return About(run, number, count), at
 
 
 def sayer_of(data: bytes) -> str:
