@@ -8,7 +8,13 @@ import pytest
 from crash_estimator.core.diagnosis import THRESHOLDS
 from crash_estimator.core.diagnosis.online import candidate_turns
 from crash_estimator.core.diagnosis.online.candidate_turns import OnlineState
-from crash_estimator.core.diagnosis.selection import assumptions, candidate_fits, forward_selection, selection_step
+from crash_estimator.core.diagnosis.selection import (
+    assumptions,
+    candidate_fits,
+    forward_selection,
+    pair_search,
+    selection_step,
+)
 from crash_estimator.core.diagnosis.selection.acceptance import needed_share
 from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
 from crash_estimator.core.effects import EFFECTS
@@ -32,9 +38,15 @@ CARE = ["slowly", "other_variants", "anew", "profile"]
 
 @pytest.mark.parametrize(
     ("out_of_reach", "explains_most", "earlier", "tried"),
-    [(False, True, (), CARE), (True, False, (), CARE[:3]), (True, True, (), []), (True, False, ("one",), [])],
+    [
+        (False, True, (), CARE),
+        (False, False, (), CARE[:3]),
+        (True, False, (), CARE[:3]),
+        (True, True, (), []),
+        (True, False, ("one",), []),
+    ],
 )
-def test_where_noise_is_out_of_reach_care_is_taken_with_a_first_effect_only_and_until_most_is_explained(
+def test_where_noise_is_out_of_reach_care_is_taken_with_a_first_effect_only_and_a_profile_where_most_is_explained(
     monkeypatch, out_of_reach, explains_most, earlier, tried
 ):
     called = []
@@ -78,6 +90,27 @@ def test_an_effect_on_two_elements_is_looked_for_only_where_one_does_not_explain
     monkeypatch.setattr(forward_selection, "_one_by_one", lambda *given: ([first], model(white=True)))
     forward_selection.forward_selection(MAGNITUDES, {}, given, first)
     assert bool(asked) == looked_for
+
+
+def test_the_first_effect_of_a_path_was_followed_where_a_second_was_fitted_beside_it():
+    one = SimpleNamespace(key=("friction", "spring"))
+    first = SimpleNamespace(before=model(), candidates=[candidate(500.0)])
+    second = SimpleNamespace(before=model(additions=("present", one)), candidates=[candidate(1.0)])
+    screened = SimpleNamespace(before=second.before, candidates=[candidate(1.0, fitted=False)])
+    followed = [forward_selection._followed(path, 1) for path in ([first], [first, screened], [first, second])]
+    assert followed == [None, None, one.key]
+
+
+def test_what_was_followed_one_by_one_is_not_followed_again_in_a_pair(monkeypatch):
+    tried = []
+    monkeypatch.setattr(pair_search, "analyse", lambda fit: SimpleNamespace(mean_square=2.0))
+    monkeypatch.setattr(
+        pair_search, "added", lambda m, r, mod, first, **how: tried.append(first.addition.key) or (m, mod)
+    )
+    monkeypatch.setattr(pair_search, "fit_candidates", lambda *given: [])
+    found = [candidate(900.0, ("friction", "a")), candidate(800.0, ("damping", "a"))]
+    assert pair_search.two_at_once(MAGNITUDES, {}, model(), found, [], ("friction", "a")) is None
+    assert tried == [("damping", "a")]
 
 
 def test_a_search_out_of_time_has_looked_at_all_candidates_once(monkeypatch):

@@ -45,7 +45,7 @@ def forward_selection(
     next_to_nothing = share_removed(given.residuals, final.residuals) > THRESHOLDS.all_but_folds
     if final.white or next_to_nothing or out_of_time():
         return path, final
-    pair = two_at_once(magnitudes, common, given, path[0].as_recorded, alike)
+    pair = two_at_once(magnitudes, common, given, path[0].as_recorded, alike, _followed(path, present))
     if pair is None:
         return path, final
     other = _one_by_one(pair.magnitudes, effects, pair.model, pair.path, present)
@@ -84,6 +84,12 @@ def _one_by_one(
             return path, done.before
         model = larger
     return path, model
+
+
+def _followed(path: Sequence[SelectionStep], present: int) -> tuple[str, str] | None:
+    """Effect and target of the first addition, where a second one was looked for beside it."""
+    looked_for = len(path) > 1 and any(one.fit for one in path[1].candidates)
+    return path[1].before.additions[present].key if looked_for else None
 
 
 def _explains_nearly_all(step: SelectionStep) -> bool:

@@ -22,14 +22,15 @@ class Pair(NamedTuple):
 
 def two_at_once(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, candidates: Sequence[CandidateFit],
-    alike: Sequence[Pair],
+    alike: Sequence[Pair], followed: tuple[str, str] | None,
 ) -> Pair | None:  # fmt: skip
     """Where no effect counts for itself in noise as large as what it leaves: two that leave only the sensors'.
 
-    candidates: all of them, as recorded; alike: two of one effect.
+    candidates: all of them, as recorded; alike: two of one effect; followed: effect and target of the one whose second
+    has been looked for already, and left more.
     """
     found = [
-        *_one_after_the_other(magnitudes, effects, model, candidates),
+        *_one_after_the_other(magnitudes, effects, model, candidates, followed),
         *(pair for pair in alike if pair.model.white or _all_but_folds(model, pair)),
     ]
     return max(found, key=lambda pair: (pair.model.white, pair.model.fit.evidence), default=None)
@@ -47,7 +48,7 @@ def two_of_one_effect(magnitudes: Magnitudes, model: Model, candidates: Sequence
     several = [places for places in alike.values() if len(places) > 1 and _likely(places[:1])]
     found = []
     for first, *others in several[: THRESHOLDS.most_alike]:
-        larger = added(magnitudes, model.records, model, first)[1]
+        larger = added(magnitudes, model.records, model, first, on_trial=True)[1]
         pairs = (_together(magnitudes, candidates, model, first, larger, o.addition) for o in others)
         found += [pair for pair in islice(pairs, THRESHOLDS.most_hosts) if pair]
     return found
@@ -100,13 +101,13 @@ def _likely(candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
     return [one for one in candidates if one.fit and one.gain > THRESHOLDS.gain_in_pair]
 
 
-def _one_after_the_other(magnitudes: Magnitudes, effects, model: Model, candidates) -> Iterator[Pair]:
+def _one_after_the_other(magnitudes: Magnitudes, effects, model: Model, candidates, followed) -> Iterator[Pair]:
     """The likeliest first ones, each with the best second one."""
     records = model.records
     for first in _likely(candidates)[: THRESHOLDS.with_care]:
-        if analyse(first.fit).mean_square >= THRESHOLDS.real_structure:
+        if first.addition.key == followed or analyse(first.fit).mean_square >= THRESHOLDS.real_structure:
             continue
-        wider, larger = added(magnitudes, records, model, first)
+        wider, larger = added(magnitudes, records, model, first, on_trial=True)
         seconds = fit_candidates(wider, effects, larger)
         if not seconds or not seconds[0].fit or seconds[0].gain < THRESHOLDS.gain_in_pair:
             continue

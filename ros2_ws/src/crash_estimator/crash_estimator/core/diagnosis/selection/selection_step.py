@@ -130,14 +130,17 @@ def bounded(residuals: Sequence[np.ndarray], records: Sequence[ObservedRecord]) 
 
 
 def added(
-    magnitudes: Magnitudes, records: Sequence[ObservedRecord], model: Model, best: CandidateFit
+    magnitudes: Magnitudes, records: Sequence[ObservedRecord], model: Model, best: CandidateFit, on_trial: bool = False
 ) -> tuple[Magnitudes, Model]:
-    """The model with a candidate that was fitted, on records, and the magnitudes that it then has."""
+    """The model with a candidate that was fitted, on records, and the magnitudes that it then has.
+
+    on_trial: it is only to be seen what a second one gains beside it.
+    """
     additions = [*model.additions, as_found(best)]
 
     def fitted(magnitudes: Magnitudes, start: Point | None) -> tuple[Magnitudes, Model]:
         larger = fit_model(magnitudes, records, additions, start)
-        return magnitudes, larger if larger.white else larger.best_of((SMALL_STEPS, LARGE_NOISE))
+        return magnitudes, larger if larger.white or on_trial else larger.best_of((SMALL_STEPS, LARGE_NOISE))
 
     if not best.addition.effect.distorts:
         return fitted(magnitudes, best.fit.point)
