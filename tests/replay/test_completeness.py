@@ -262,6 +262,7 @@ def test_what_was_asked_for_and_then_comes_by_itself_comes_late():
     written.fetched.add(4, 8)
     assert written.came_late(About(0, 4, 1)) and written.came_late(About(0, 5, 3))
     assert not written.came_late(About(0, 7, 2)) and not written.came_late(About(1, 4, 1))
+    assert not written.came_late(About(0, 5, 0))  # a new model, before there is anything to say
     written.add(About(1, 0, 1))
     assert not written.came_late(About(1, 4, 1))
 

@@ -60,7 +60,8 @@ class Written:
 
     def came_late(self, about: About) -> bool:
         """Whether these have been asked for, and were given, before they came by themselves."""
-        return about.run == self.run and not self.fetched.missing(about.number, about.number + about.count)
+        known = about.run == self.run and about.count > 0
+        return known and not self.fetched.missing(about.number, about.number + about.count)
 
     def give_up(self, run: int, span: Span, why: str) -> None:
         self._begin(run)
