@@ -103,7 +103,7 @@ def test_an_effect_on_two_elements_is_tried_on_both(monkeypatch, together, pairs
     """Neither explains enough alone; what the second one adds to the first must count for a pair."""
     given = model(100.0)
     one, other = (step(given).candidates[0] for _ in range(2))
-    monkeypatch.setattr(pair_search, "added", lambda *given: (None, model(50.0, 1)))
+    monkeypatch.setattr(pair_search, "added", lambda *given, on_trial: (None, model(50.0, 1)))
     monkeypatch.setattr(pair_search, "fit_model", lambda *given: model(1.0, 2, evidence=together))
     found = pair_search.two_of_one_effect(SimpleNamespace(), given, [one, other])
     assert len(found) == pairs
