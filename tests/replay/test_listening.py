@@ -27,6 +27,17 @@ def test_samples_are_waited_with_until_all_that_is_known_of_is_found(quiet, more
     assert listening.settled() == settled
 
 
+def test_a_while_in_which_it_got_no_processor_is_not_quiet():
+    node = SimpleNamespace(get_topic_names_and_types=list)
+    listening = Listening(node, Choice(), 0, print)
+    listening.newest = time.monotonic() - 10.0 * SETTLED
+    listening.looked = listening.newest
+    listening.look()
+    assert not listening.settled()
+    time.sleep(SETTLED)
+    assert listening.settled()
+
+
 @pytest.mark.parametrize("more_to_come", [False, True])
 def test_it_is_ready_when_it_hears_the_samples_and_nothing_more_is_to_come(more_to_come):
     listening = Listening(NODE, Choice(), 0, print, lambda: more_to_come)

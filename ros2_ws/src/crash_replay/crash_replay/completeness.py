@@ -139,10 +139,13 @@ class Completeness:
                 self.of(topic).fetched = Numbers()
         self.revisions[node] = revision
 
+    def test_to_come(self) -> bool:
+        """Whether its topic has been found, and nothing has come on it yet."""
+        return TEST in self.types.values() and not self.total
+
     def channels_to_come(self) -> bool:
-        """Whether the test has not come yet, or a channel of it that is to be recorded has not been found."""
-        test_to_come = TEST in self.types.values() and not self.total
-        return test_to_come or not self.channels.written.keys() <= self.types.keys()
+        """Whether a channel of the test that is to be recorded has not been found yet."""
+        return not self.channels.written.keys() <= self.types.keys()
 
     def of(self, topic: str) -> Written:
         return self.written.setdefault(topic, Written())

@@ -34,10 +34,13 @@ class Listening:
         self.node, self.choice, self.wait_for, self.hear, self.more_to_come = node, choice, wait_for, hear, more_to_come
         self.heard: dict[str, Heard] = {}  # by name
         self.newest = 0.0  # monotonic s, when a topic was found
+        self.looked = time.monotonic()
 
     def look(self) -> list[Heard]:
         """What has been found since the last look; a replay that waits for this node begins when all is heard."""
-        found = []
+        now, found = time.monotonic(), list[Heard]()
+        self.newest += max(0.0, now - self.looked - SETTLED / 2)  # while this process stands still it finds nothing
+        self.looked = now
         for name, (kind, *_) in self.node.get_topic_names_and_types():
             if name in self.heard or not self.choice.wants(name, kind) or not self.node.count_publishers(name):
                 continue

@@ -134,6 +134,7 @@ class RecordNode(Node):
             times = (time.strftime("%H:%M:%S", time.localtime(time.time() - ago)) for ago in (now - self.looked, 0.0))
             self.stood_still.append(" to ".join(times))
             self.last = now
+        self.last += max(0.0, now - self.looked - 2 * LOOK)  # while this process stands still it hears nothing
         self.looked = now
         for topic in self.listening.look():
             self.account.found(topic.name, topic.type)
@@ -155,8 +156,9 @@ class RecordNode(Node):
             self.account.known_to_replay = {one.node: one.role for one in state.listeners if one.state not in GONE}
 
     def _channels_to_come(self) -> bool:
-        """Whether a replay is there whose test, or a channel of it that is to be recorded, is still to come."""
-        return self.count_publishers("replay_state") > 0 and self.account.channels_to_come()
+        """Whether a test is still to come, or of a replay a channel that is to be recorded."""
+        replay_is_there = self.count_publishers("replay_state") > 0
+        return self.account.test_to_come() or (replay_is_there and self.account.channels_to_come())
 
     def _replay_is_gone(self) -> bool:
         others = self.attending.others

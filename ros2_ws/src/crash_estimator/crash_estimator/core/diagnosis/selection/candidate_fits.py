@@ -137,8 +137,8 @@ class _Search:
         """Fit the likeliest that has a constant which says when its force ends, over that; closer, where it comes near
         the best one.
 
-        Where that is missing, hysteresis on its target explains most already: it did in the two of 303 looked-at
-        searches in which this led to a better answer.
+        Where that is missing, hysteresis on its target explains most already: it did in the one of 303 looked-at
+        searches, and in the one bag of the project, in which this led to a better answer.
         """
         likeliest = next((one for one in self.ranking() if one.addition.effect.profiled), None)
         if likeliest is None:
