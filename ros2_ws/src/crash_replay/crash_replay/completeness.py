@@ -80,7 +80,6 @@ class ChannelsWritten:
 
     def __init__(self, topics: Collection[str] = ()):
         """topics: of the test's channels that are to be recorded."""
-        self.topics = topics
         self.numbers: dict[int, int] = {}  # of the samples, by their instants in ns
         self.written = {topic: Numbers() for topic in topics}
         self.early: dict[str, list[int]] = {topic: [] for topic in topics}  # instants whose samples had not come

@@ -95,7 +95,7 @@ class RecordNode(Node):
     def _take_account(self, topic: Heard, data: bytes) -> None:
         if topic.type in NUMBERED:
             self.account.of(topic.name).add(about(data))
-            if topic.name == self.account.samples_topic and self.account.channels.topics:
+            if topic.name == self.account.samples_topic and self.account.channels.written:
                 self.account.channels.add_samples(about(data).number, instants_of(data))
         elif topic.type in CHANNELS:
             self.account.channels.add(topic.name, stamp_of(data))
