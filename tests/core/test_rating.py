@@ -48,6 +48,18 @@ def test_a_signal_rates_itself_as_excellent():
     assert rating.shift == 0 and rating.grade == "excellent"
 
 
+def test_a_comparison_whose_squares_are_beyond_all_numbers_is_rated():
+    """As of a simulation that runs away: the way back through the warped pairs would else leave them."""
+    reference, _ = signals(400, 0, 1.0, 0.0)
+    rating = rate(reference, 1e200 * np.exp(np.linspace(-9.0, 0.0, 400)))
+    assert (rating.corridor < 0.5, rating.magnitude, rating.slope, rating.grade) == (True, 0.0, 0.0, "poor")
+
+
+def test_a_common_unit_is_no_matter():
+    reference, comparison = signals(700, -3, 0.8, 10.0)
+    assert_allclose(rate(1e160 * reference, 1e160 * comparison)[:5], rate(reference, comparison)[:5], rtol=1e-9)
+
+
 @pytest.mark.parametrize("late", [-20, 7])
 def test_a_shift_costs_phase_in_proportion(late):
     """A lone pulse, so that nothing is lost at the ends."""

@@ -60,6 +60,8 @@ def rate(reference: np.ndarray, comparison: np.ndarray) -> Rating:
         raise ValueError("a rating needs signals without gaps")
     if not np.ptp(reference) > 0.0:
         raise ValueError("a rating needs a reference that changes, got a constant one")
+    unit = max(np.abs(reference).max(), np.abs(comparison).max())  # in it no square is beyond all numbers
+    reference, comparison = reference / unit, comparison / unit
     shift = _shift(reference, comparison)
     n = len(reference) - abs(shift)
     t, c = (reference[:n], comparison[shift:]) if shift >= 0 else (reference[-n:], comparison[:n])

@@ -1,7 +1,8 @@
 """Dry friction: F = c tanh(V / speed), a constant force against the motion.
 
 V is the rate of crush in m/s, compression positive; c in N, never negative. The smoothing speed, at which
-friction has reached three quarters of its force, is found.
+friction has reached three quarters of its force, is found: up to 1 m/s, and a fifth of the largest rate of crush, as
+what rises with the rate beyond that is a damper.
 """
 
 import numpy as np
@@ -16,7 +17,7 @@ def force(motion: ElementMotion, speed: float):
 EFFECT = ElementForce(
     "coulomb_friction",
     "N",
-    {"speed": Shape("m/s", 0.01, 1.0, (0.1,), of_rate=True)},
+    {"speed": Shape("m/s", 0.01, 1.0, (0.5,), of_rate=True)},
     force=force,
     of_rate_only=True,
 )

@@ -46,7 +46,7 @@ class Shape:
     high: float
     starts: tuple[float, ...]
     of_crush: bool = False  # limits and starts are shares of the element's largest crush
-    of_rate: bool = False  # likewise of its largest rate of crush, where that is below 1 m/s
+    of_rate: bool = False  # where its largest rate of crush is below 5 m/s, less in proportion
 
 
 class OwnLink(NamedTuple):

@@ -100,7 +100,7 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
             h, dh, by_shape = _factor(term, theta, rate)
             factor = factor + c * h
             kv = kv + static * c * dh
-            parameters += [term.coefficient, *term.shapes.values()]
+            parameters += [term.coefficient, *term.varied.values()]
             columns += [static * h, *(static * c * d for d in by_shape)]
         force, kx, kp, weight = static * factor, kx * factor, kp * factor, weight * factor[:, None]
     if link.curve is None and link.constant is not None:
@@ -130,9 +130,9 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
             columns.append(beside.gate * f)
             if not c:  # nothing that a slope or a shape constant would change
                 continue
-            fx, fv, by_shape = _slopes(term, theta, motion)
+            fx, fv, by_shape = _slopes(term, theta, motion, f)
             beside.add(c * f, c * fx, c * fv)
-            parameters += term.shapes.values()
+            parameters += term.varied.values()
             columns += [beside.gate * c * d for d in by_shape]
         for term in link.remembering:
             beside = crushed if link.outlasts(term.addition.effect) else contact
@@ -187,8 +187,8 @@ def _inside(term: Term, theta: np.ndarray, at: np.ndarray) -> _Inside:
     nothing, c = np.zeros_like(at), theta[term.coefficient]
     motion = ElementMotion(nothing, at, nothing, at, nothing)
     f = _physics(term).force(motion, **term.shapes_at(theta))
-    slope, _, by_shape = _slopes(term, theta, motion)
-    parameters = [term.coefficient, *term.shapes.values()]
+    slope, _, by_shape = _slopes(term, theta, motion, f)
+    parameters = [term.coefficient, *term.varied.values()]
     return _Inside(c * f, c * slope, parameters, [f, *(c * each for each in by_shape)])
 
 
@@ -198,18 +198,18 @@ def _remembered(term: Term, link: Link, theta, time, x, beside: _Beside, paramet
     memory = partial(_physics(term).memory, np.concatenate([time[:1], time]), form=term.addition.variant)
     crush = np.concatenate([[0.0], x if link.tension else np.maximum(x, 0.0)])
     z, kept, by_crush, by_before = (each[1:] for each in memory(crush, 0.0, **shapes))
-    parameters += [term.coefficient, *term.shapes.values()]
+    parameters += [term.coefficient, *term.varied.values()]
     gate = beside.gate
     columns += [gate * z]
-    columns += [gate * c * d for d in term.by_shapes(theta, lambda **s: memory(crush, 0.0, **s)[0][1:])]
+    columns += [gate * c * d for d in term.by_shapes(theta, z, lambda **s: memory(crush, 0.0, **s)[0][1:])]
     if not link.tension:
         by_crush, by_before = by_crush * (x > 0.0), by_before * (crush[:-1] > 0.0)
     beside.add(c * z, c * by_crush, 0.0)
     return Memory(kept, by_crush, by_before, gate * c)
 
 
-def _slopes(term: Term, theta: np.ndarray, motion: ElementMotion):
-    """Of an effect's force, by crush and rate, and its derivatives by the logarithm of each shape constant."""
+def _slopes(term: Term, theta: np.ndarray, motion: ElementMotion, force: np.ndarray):
+    """Of an effect's force (g,), by crush and rate, and its derivatives by the logarithm of each shape constant."""
     effect, shapes = _physics(term), term.shapes_at(theta)
 
     def shifted(sign):
@@ -220,12 +220,13 @@ def _slopes(term: Term, theta: np.ndarray, motion: ElementMotion):
 
     fx = 0.0 if effect.of_rate_only else (shifted(1.0) - shifted(-1.0)) / (2.0 * SMALL_CRUSH)
     fv = 0.0 if effect.of_crush_only else (faster(1.0) - faster(-1.0)) / (2.0 * SMALL_RATE)
-    return fx, fv, term.by_shapes(theta, lambda **shapes: effect.force(motion, **shapes))
+    return fx, fv, term.by_shapes(theta, force, lambda **shapes: effect.force(motion, **shapes))
 
 
 def _factor(term: Term, theta: np.ndarray, rate: np.ndarray):
     """h, dh/dV, and its derivatives by the logarithm of each shape constant."""
     effect, shapes = _physics(term), term.shapes_at(theta)
     up, down = (effect.factor(rate + step, **shapes) for step in (FACTOR_RATE, -FACTOR_RATE))
-    by_shape = term.by_shapes(theta, lambda **shapes: effect.factor(rate, **shapes))
-    return effect.factor(rate, **shapes), (up - down) / (2.0 * FACTOR_RATE), by_shape
+    factor = effect.factor(rate, **shapes)
+    by_shape = term.by_shapes(theta, factor, lambda **shapes: effect.factor(rate, **shapes))
+    return factor, (up - down) / (2.0 * FACTOR_RATE), by_shape

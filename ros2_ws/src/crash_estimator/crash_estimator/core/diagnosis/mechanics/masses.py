@@ -51,7 +51,7 @@ def body_loads(
         found = load(**term.shapes_at(theta))
         if found is not None:
             body, force = found
-            by_shapes = term.by_shapes(theta, lambda load=load, **shapes: load(**shapes)[1])
+            by_shapes = term.by_shapes(theta, force, lambda load=load, **shapes: load(**shapes)[1])
             yield BodyLoad(term, layout.structure.body_index[body], force, by_shapes)
 
 

@@ -5,6 +5,7 @@ recording the nuisances (errors and drifts of its outputs' zeros, slow errors of
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -67,6 +68,11 @@ class Layout(NamedTuple):
         """Constant stiffnesses -> what the model file says of them, N/m."""
         links = (link for link in self.links if link.constant is not None)
         return {link.constant: link.known_stiffness for link in links if link.known_stiffness > 0.0}
+
+    def holding_shapes(self) -> "Layout":
+        """The same parameters, of which no force is differentiated by a shape constant."""
+        links = (replace(link, terms=tuple(term._replace(held=True) for term in link.terms)) for link in self.links)
+        return self._replace(links=tuple(links), terms=tuple(term._replace(held=True) for term in self.terms))
 
     def term(self, addition: Addition) -> Term:
         """That of an addition with the same effect and target: a model has no effect twice on one target."""

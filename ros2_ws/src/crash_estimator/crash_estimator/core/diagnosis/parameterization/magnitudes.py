@@ -20,6 +20,12 @@ SHORTEST_SHARE = 0.15
 is less), or its scale of stiffness becomes absurd."""
 
 
+FAST = 5.0
+"""m/s: a rate of crush for which an effect's limits hold as they stand. Where the largest one is less, so are they: a
+friction that comes to its force near the largest rate of all is a damper, as of five carts that were let go by hand,
+whose dampers it took the place of (0.4 to 0.7 m/s)."""
+
+
 class Magnitudes(NamedTuple):
     structure: Structure
     records: Sequence[ObservedRecord]
@@ -43,7 +49,7 @@ class Magnitudes(NamedTuple):
         """What a shape constant's limits and starts are shares of."""
         if shape.of_crush:
             return self.largest_crush(target)
-        return min(float(self.rate[self.element(target)]), 1.0) if shape.of_rate else 1.0
+        return min(float(self.rate[self.element(target)]) / FAST, 1.0) if shape.of_rate else 1.0
 
     def crushed_elements(self) -> list[Element]:
         """Elements that are crushed at all: of the others nothing can be told."""

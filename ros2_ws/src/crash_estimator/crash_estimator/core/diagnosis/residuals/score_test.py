@@ -13,7 +13,6 @@ all c_j are zero
     u = D'r - D'J H^-1 (J'r - L (theta - mu)),   S = D'D - D'J H^-1 J'D,   u' S^-1 u has chi^2 of MODES.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -60,7 +59,7 @@ class Drift(NamedTuple):
 def drift_of(fitted: Fit) -> Drift:
     """The test of one fit, in the noise of its records."""
     layout = fitted.layout
-    free = [k for k, kind in enumerate(layout.kind) if kind == FREE]
+    free = np.array([k for k, kind in enumerate(layout.kind) if kind == FREE], int)  # none where all are driven
     names = [f"the mass of {layout.bodies[k]}" for k in free]
     names += [f"a force on {layout.bodies[k]}" for k in free]
     names += [f"the gain of {output.channel}" for output in layout.outputs]
@@ -100,7 +99,7 @@ def _statistic(score: np.ndarray, information: np.ndarray) -> tuple[float, int]:
 
 
 @may_diverge
-def _normal_equations(fitted: Fit, free: Sequence[int]) -> Normal:
+def _normal_equations(fitted: Fit, free: np.ndarray) -> Normal:
     """The fit's own, and after its parameters the directions of `drift_of`, in its order."""
     layout = fitted.layout
     size = layout.size + (2 * len(free) + len(layout.outputs)) * MODES
@@ -122,7 +121,7 @@ def _normal_equations(fitted: Fit, free: Sequence[int]) -> Normal:
     return Normal(matrix, vector, cost, samples, 0.0)
 
 
-def _with_motion(equations: Equations, modes: np.ndarray, free: Sequence[int], first: int) -> Equations:
+def _with_motion(equations: Equations, modes: np.ndarray, free: np.ndarray, first: int) -> Equations:
     """With one more column for each mode of each free body's mass, then of the force on it; modes (g, MODES)."""
     linear, rows = equations.linear, equations.rows[:, free].T
     acts = np.concatenate([-rows, np.repeat(np.abs(rows).max(axis=1, keepdims=True), len(modes), axis=1)])

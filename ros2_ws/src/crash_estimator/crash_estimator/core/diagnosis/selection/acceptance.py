@@ -39,6 +39,11 @@ def cost_of_nothing(records: Sequence[ObservedRecord]) -> float:
     return sum(float(np.nansum((record.measured / record.noise) ** 2)) for record in records)
 
 
+def mean_square_of_nothing(records: Sequence[ObservedRecord]) -> float:
+    """Of predicting zero, as of `Residuals`, in units of the noise."""
+    return cost_of_nothing(records) / sum(np.count_nonzero(np.isfinite(record.measured)) for record in records)
+
+
 def share_removed(before: Residuals, after: Residuals) -> float:
     """Of the mean square residual above that of the noise."""
     return (before.mean_square - after.mean_square) / max(before.mean_square - 1.0, 1e-9)

@@ -15,7 +15,15 @@ from ..parameterization.free_curve import adapted_roughness
 from ..parameterization.layout import Layout
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import Residuals, analyse
-from .acceptance import better, cost_of_nothing, settled
+from .acceptance import better, cost_of_nothing, mean_square_of_nothing, settled
+
+
+STRAIGHT = 1e-3
+"""Roughness of a curve that is a line: its slope then changes by a thousandth over the whole crush."""
+
+
+RUNS_AWAY = 4.0
+"""Times the mean square of what was measured: a swing in the opposite phase leaves as much, a bounded one no more."""
 
 
 class Model(NamedTuple):
@@ -65,6 +73,8 @@ def fit_model(
     residuals = analyse(found, sharply=True)
     if not problem.noise_is_inflated:
         found, residuals = _with_more_care(problem, found, residuals)
+    if roughness and not residuals.mean_square < RUNS_AWAY * mean_square_of_nothing(records):
+        found, residuals = _with_straight_curves(magnitudes, problem, additions)
     return Model(tuple(additions), found, residuals, roughness)
 
 
@@ -90,6 +100,21 @@ def _with_more_care(problem: OutputErrorProblem, found: Fit, residuals: Residual
             if there.mean_square < residuals.mean_square:
                 found, residuals = other, there
     return found, residuals
+
+
+def _with_straight_curves(
+    magnitudes: Magnitudes, problem: OutputErrorProblem, additions: Sequence[Addition]
+) -> tuple[Fit, Residuals]:
+    """The best fit whose curves are straight lines, or the lines that a fit begins with, as one of the problem's own.
+
+    A free curve that lacks what ends a long swing may be bent until the motion runs away, wherever a fit begins.
+    """
+    lines = {link.name: STRAIGHT for link in problem.layout.links if link.curve is not None}
+    straight = make_problem(magnitudes, problem.records, additions, lines)
+    found = [fit(straight, schedule=schedule).point for schedule in ((), SMALL_STEPS, LARGE_NOISE)]
+    found.append(straight.measured(straight.layout.start))
+    held = [fit(problem, point, held=range(problem.layout.size)) for point in found]
+    return min(((one, analyse(one, sharply=True)) for one in held), key=lambda found: found[1].mean_square)
 
 
 def forces_jump(layout: Layout) -> bool:

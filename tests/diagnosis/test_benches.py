@@ -1,0 +1,80 @@
+"""What else than a crash is put on a bench: a cart on a spring that is let go, a damper between a rod and a frame.
+
+The cart is simulated here, in steps of 50 us; friction sticks (Karnopp). An encoder shows it at 200 Hz.
+"""
+
+import numpy as np
+import pytest
+
+from crash_estimator.core.diagnosis import diagnose
+from crash_estimator.core.structure import Body, Coefficient, Element, Structure
+from crash_replay.gravity import G
+from crash_replay.recording import Channel, Recording, Test
+
+MASS, STIFFNESS, DAMPING, LET_GO_AT = 0.6, 400.0, 0.6, 0.03
+
+
+def swing(friction: float, damping: float = DAMPING, noise: float = 5e-6) -> Recording:
+    """4 s, some 16 periods."""
+    step, every = 5e-5, 100
+    x, v, shown = LET_GO_AT, 0.0, []
+    for k in range(int(4.0 / step)):
+        if k % every == 0:
+            shown.append(x)
+        rest = -STIFFNESS * x - damping * v
+        sticks = abs(v) < 1e-4 and abs(rest) <= friction
+        v = 0.0 if sticks else v + step * (rest - friction * np.sign(v or rest)) / MASS
+        x += step * v
+    measured = np.array(shown) + np.random.default_rng(3).normal(0.0, noise, len(shown))
+    at = {"initial_displacement": {"cart": LET_GO_AT}, "initial_velocity": {"cart": 0.0}}
+    test = Test("swing", (Channel("cart_x", "displacement", "cart", "x"),), **at)
+    return Recording(test, np.arange(len(shown)) * 5_000_000, measured[:, None])
+
+
+def undamped(shape: str) -> Structure:
+    spring = Coefficient(300.0, estimated=True, min=0.0, shape=shape)
+    bodies = Body("cart", mass=MASS, displacement="cart_x"), Body("wall", fixed=True)
+    return Structure("cart", bodies, (Element("spring", ("cart", "wall"), spring, Coefficient(0.0)),))
+
+
+def named(found) -> dict[str, float]:
+    assert found.verdict == "effect_missing", found.text
+    return {step.effect: step.coefficient for step in found.steps}
+
+
+@pytest.mark.parametrize("shape", ["constant", "curve"])
+def test_friction_that_rises_with_the_rate_to_its_largest_is_a_damper(shape):
+    """Both are missing. Dry friction that came to its force near the largest rate would follow both, as one."""
+    effects = named(diagnose(undamped(shape), [swing(friction=0.08)]))
+    assert effects.pop("viscous_damping") == pytest.approx(DAMPING, rel=0.1)
+    (dry,) = effects.items()
+    assert dry[0] in ("coulomb_friction", "hysteresis") and dry[1] == pytest.approx(0.08, rel=0.25)
+
+
+def test_a_free_curve_that_lacks_the_damping_of_a_long_swing_does_not_run_away():
+    """An elastic spring leaves as much as a swing in the opposite phase, at most: twice what was measured."""
+    recording = swing(friction=0.0)
+    found = diagnose(undamped("curve"), [recording])
+    assert named(found)["viscous_damping"] == pytest.approx(DAMPING, rel=0.05)
+    largest = STIFFNESS / MASS * LET_GO_AT / G
+    assert found.residual_rms.before / G < 2.0 * largest and found.left_before.rms / G < 2.0 * largest
+    assert np.isfinite([one.evidence for one in found.ranking]).all()
+
+
+def test_a_damper_of_which_no_body_moves_freely_is_found():
+    """A rod that is driven, a force that is measured on the frame: k X + c V."""
+    time, damping = np.arange(0.0, 2.0, 1e-3), 800.0
+    pulse = 2.0 * np.pi * 3.0
+    x, v, a = (0.02 * pulse**n * np.sin(pulse * time + n * np.pi / 2.0) for n in range(3))
+    rng = np.random.default_rng(8)
+    force = 2e4 * x + damping * v + rng.normal(0.0, 2.0, len(time))
+    channels = Channel("rod_ax", "acceleration", "rod", "x"), Channel("frame_fx", "force", "frame", "x")
+    test = Test("bench", channels, initial_velocity={"rod": float(v[0])}, initial_displacement={"rod": 0.0})
+    shown = np.column_stack([a + rng.normal(0.0, 0.01, len(time)), force])
+    bodies = Body("rod", acceleration=("rod_ax",), driven=True), Body("frame", fixed=True, force="frame_fx")
+    spring = Coefficient(1e4, estimated=True, shape="constant")
+    strut = Element("strut", ("rod", "frame"), spring, Coefficient(0.0))
+    found = diagnose(
+        Structure("bench", bodies, (strut,)), [Recording(test, np.arange(len(time)) * 1_000_000, shown)]
+    )
+    assert named(found)["viscous_damping"] == pytest.approx(damping, rel=0.02)
