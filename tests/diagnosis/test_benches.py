@@ -45,10 +45,13 @@ def named(found) -> dict[str, float]:
 @pytest.mark.parametrize("shape", ["constant", "curve"])
 def test_friction_that_rises_with_the_rate_to_its_largest_is_a_damper(shape):
     """Both are missing. Dry friction that came to its force near the largest rate would follow both, as one."""
-    effects = named(diagnose(undamped(shape), [swing(friction=0.08)]))
+    found = diagnose(undamped(shape), [swing(friction=0.08)])
+    effects = named(found)
     assert effects.pop("viscous_damping") == pytest.approx(DAMPING, rel=0.1)
     (dry,) = effects.items()
     assert dry[0] in ("coulomb_friction", "hysteresis") and dry[1] == pytest.approx(0.08, rel=0.25)
+    told = [(one["element"], one["constant"], one["value"]) for one in found.as_json()["constants"]]
+    assert told == ([("spring", "stiffness", pytest.approx(STIFFNESS, rel=0.01))] if shape == "constant" else [])
 
 
 def test_a_free_curve_that_lacks_the_damping_of_a_long_swing_does_not_run_away():
@@ -74,7 +77,5 @@ def test_a_damper_of_which_no_body_moves_freely_is_found():
     bodies = Body("rod", acceleration=("rod_ax",), driven=True), Body("frame", fixed=True, force="frame_fx")
     spring = Coefficient(1e4, estimated=True, shape="constant")
     strut = Element("strut", ("rod", "frame"), spring, Coefficient(0.0))
-    found = diagnose(
-        Structure("bench", bodies, (strut,)), [Recording(test, np.arange(len(time)) * 1_000_000, shown)]
-    )
+    found = diagnose(Structure("bench", bodies, (strut,)), [Recording(test, np.arange(len(time)) * 1_000_000, shown)])
     assert named(found)["viscous_damping"] == pytest.approx(damping, rel=0.02)

@@ -20,6 +20,7 @@ def diagnosis_tables(found: Diagnosis) -> str:
         "" if adequate else misfit_table(found.misfit, "where it fails, as given"),
         ranking_table(found.ranking),
         steps_table(found),
+        constants_table(found),
         revisions_table(found),
         misfit_table(found.misfit_after, "where it still fails")
         if found.steps and found.verdict == "unexplained"
@@ -84,6 +85,14 @@ def steps_table(found: Diagnosis) -> str:
     }
     said = {head: cells for head, cells in columns.items() if any(cells)}
     return table(tuple(said), list(zip(*said.values()))) if found.steps else ""
+
+
+def constants_table(found: Diagnosis) -> str:
+    """Stiffnesses and dampings that were fitted beside the effects."""
+    rows = [
+        (f"{one.constant} of {one.element}", f"{one.value:.4g} +- {one.std:.2g} {one.unit}") for one in found.constants
+    ]
+    return table(("fitted", "with what was added" if found.steps else "as given"), rows) if rows else ""
 
 
 def revisions_table(found: Diagnosis) -> str:

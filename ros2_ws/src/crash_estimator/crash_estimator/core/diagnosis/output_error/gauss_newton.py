@@ -128,7 +128,8 @@ def equation_error_start(problem: OutputErrorProblem, held: Sequence[int] = ()) 
     stays = shape_parameters(layout)
     stays[layout.common :] = True
     stays[list(held)] = True
-    step = solve(layout, equation_error(problem.holding_shapes(), point), point.theta, FROM_MEASURED_MOTION[0].inflate, stays)
+    normal = equation_error(problem.holding_shapes(), point)
+    step = solve(layout, normal, point.theta, FROM_MEASURED_MOTION[0].inflate, stays)
     return Point(point.theta + step.delta, point.trajectories)
 
 

@@ -25,6 +25,7 @@ from ..selection.selection_step import band_of_steps, fit_of_all, sized_models
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_limit import out_of_time, time_limit
 from ..selection.time_zero import Shift, TimeZero, moved_by, onsets, sharpened, time_zero_wrong
+from .fitted_constants import FittedConstant, fitted_constants
 from .left import Left, left_by
 from .model_effects import structure_with
 from .ranking import Ranked, StepReport, ranking_of, step_of
@@ -60,6 +61,7 @@ class Diagnosis:
     ranking: tuple[Ranked, ...]  # of the first step, best first
     steps: tuple[StepReport, ...]  # effects added, in order
     remaining: tuple[Ranked, ...]  # what was left of the candidates in the last step
+    constants: tuple[FittedConstant, ...]  # of the structure, with what was added
     misfit: tuple[MisfitWindow, ...]  # of the structure as it was given
     misfit_after: tuple[MisfitWindow, ...]
     structure: Structure  # with the effects that were added
@@ -83,6 +85,7 @@ class Diagnosis:
             "free_run_rms": {k: v for k, v in vars(self.free_run_rms).items() if v is not None},
             "ranking": [ranked.as_json() for ranked in self.ranking],
             "steps": [step.as_json() for step in self.steps],
+            "constants": [constant._asdict() for constant in self.constants],
             "misfit": [window._asdict() for window in self.misfit],
             "misfit_after": [window._asdict() for window in self.misfit_after],
         }
@@ -219,6 +222,7 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
         ranking=ranking,
         steps=reports,
         remaining=ranking_of(steps[-1]),
+        constants=fitted_constants(of_all),
         misfit=misfit_windows(given.fit.layout, given.records, given.residuals),
         misfit_after=misfit_windows(final.fit.layout, final.records, final.residuals),
         structure=structure_with(path.structure, added, effects_added),

@@ -17,10 +17,8 @@ from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import Residuals, analyse
 from .acceptance import better, cost_of_nothing, mean_square_of_nothing, settled
 
-
 STRAIGHT = 1e-3
 """Roughness of a curve that is a line: its slope then changes by a thousandth over the whole crush."""
-
 
 RUNS_AWAY = 4.0
 """Times the mean square of what was measured: a swing in the opposite phase leaves as much, a bounded one no more."""
@@ -109,7 +107,7 @@ def _with_straight_curves(
 
     A free curve that lacks what ends a long swing may be bent until the motion runs away, wherever a fit begins.
     """
-    lines = {link.name: STRAIGHT for link in problem.layout.links if link.curve is not None}
+    lines = {link.name: np.array(STRAIGHT) for link in problem.layout.links if link.curve is not None}
     straight = make_problem(magnitudes, problem.records, additions, lines)
     found = [fit(straight, schedule=schedule).point for schedule in ((), SMALL_STEPS, LARGE_NOISE)]
     found.append(straight.measured(straight.layout.start))
