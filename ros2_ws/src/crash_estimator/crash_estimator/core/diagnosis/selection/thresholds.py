@@ -69,8 +69,8 @@ class Thresholds(NamedTuple):
     has 0.30 at most, ten copies of NHTSA 10146 that differ in the last digit 0.44: it is closer than it was thought."""
 
     # How much is tried: numbers that bound the work. Smaller ones lost what is said of each; those of which nothing is
-    # said were taken down to 3, 2 and 100 together with others: no verdict of 183 looked-at cases, those that take long,
-    # became worse. What they save by themselves was not measured
+    # said were taken down to 3, 2 and 100 together: no verdict of 183 looked-at cases, of those that take long, became
+    # worse. What they save by themselves was not measured
     most_steps: int = 4
     """Additions: what takes more is not told from a free curve that follows anything."""
     shortlist: int = 5
