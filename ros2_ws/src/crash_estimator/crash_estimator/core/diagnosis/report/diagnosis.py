@@ -31,7 +31,7 @@ from .model_effects import structure_with
 from .ranking import Ranked, StepReport, ranking_of, step_of
 from .time_zero_step import TIME_ZERO, as_ranked, signals_begin, time_zero_step
 from .tolerance import DEFAULT, Tolerance
-from .verdict import ADEQUATE, Evidence, verdict_on
+from .verdict import ADEQUATE, EFFECT_MISSING, UNEXPLAINED, Evidence, verdict_on
 from .verdict_text import verdict_text
 
 
@@ -208,6 +208,10 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
     verdict = verdict_on(evidence, tolerance)
     if added and verdict.word == ADEQUATE:
         return _answer(structure, up_to(path, 0), tolerance, None)
+    if len(added) > 1 and verdict.word == UNEXPLAINED:
+        first = _answer(structure, up_to(path, 1), tolerance, zero)
+        if first.verdict == EFFECT_MISSING:  # what came after it is no reason to doubt it
+            return first
     floor = noise_floor(given.fit.layout, given.records)
     return Diagnosis(
         verdict=verdict.word,
