@@ -83,8 +83,8 @@ def test_the_engine_is_named_that_a_one_mass_car_lacks():
 
 @nhtsa
 def test_the_engine_is_named_of_the_filtered_recording_whatever_was_added_after_it():
-    """Of the engine and a second body the rest varies with time, by 0.450 of it on one processor, where 0.45 is allowed;
-    of the engine alone by 0.2."""
+    """Of what the engine and a second body leave 0.450 varies with time, on one processor, where 0.45 is allowed; of
+    what the engine alone leaves 0.2."""
     found = diagnose(load_model("frontal_single"), [filter_recording(read_source(NHTSA), 60)])
     assert found.verdict == "effect_missing" and found.steps[0].target.startswith("engine")
     assert found.steps[0].coefficient == pytest.approx(400.0, rel=0.25)
