@@ -51,4 +51,4 @@ def test_a_real_damper_is_named_and_its_rivals_with_it():
     name, truth, told, _, _, right, _ = outside.judged(case)
     assert told.startswith("`effect_missing`: viscous_damping on spring ") and right == "yes", (name, truth, told)
     assert "(or rate_hardening on spring" in told
-    assert "coulomb_friction" not in told, "friction that rises up to the largest rate is that damper under another name"
+    assert "coulomb_friction" not in told, "friction that rises up to the largest rate is that damper"
