@@ -42,7 +42,7 @@ class OutputErrorProblem(NamedTuple):
 
     def holding_shapes(self) -> "OutputErrorProblem":
         """The same, where shape constants stay."""
-        return OutputErrorProblem(self.layout.holding_shapes(), self.experiments).on(self.records)
+        return self._replace(layout=self.layout.holding_shapes()).on(self.records)
 
     def starting_at(self, start: np.ndarray, trusted: Sequence[int] = ()) -> "OutputErrorProblem":
         """The same with other starting values (p,).

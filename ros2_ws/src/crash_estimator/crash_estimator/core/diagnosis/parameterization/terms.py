@@ -34,9 +34,7 @@ class Term(NamedTuple):
         """Its shape constants, the logarithm of one of them longer by a step."""
         return {name: float(np.exp(theta[p] + LOG_STEP * (name == longer))) for name, p in self.shapes.items()}
 
-    def by_shapes(
-        self, theta: np.ndarray, value: np.ndarray, function: Callable[..., np.ndarray]
-    ) -> list[np.ndarray]:  # fmt: skip
+    def by_shapes(self, theta: np.ndarray, value: np.ndarray, function: Callable[..., np.ndarray]) -> list[np.ndarray]:
         """Derivatives of function(**shapes), whose value is known, by the logarithm of each that varies."""
         return [(function(**self.shapes_at(theta, name)) - value) / LOG_STEP for name in self.varied]
 

@@ -84,7 +84,7 @@ class Thresholds(NamedTuple):
     tried on beside the one where it explains most."""
     with_care: int = 3
     """Candidates that are then fitted on by other schedules, and that are tried with a second one at once: with two a
-    Maxwell element was told as friction with an unloading line."""
+    Maxwell element was unexplained, by friction with an unloading line."""
     inflations: int = 3
     """Times that the noise is taken as large as what the best candidate leaves: with two, one of a bag's two unloading
     lines was told as hysteresis ..."""
