@@ -19,8 +19,8 @@ def test_a_force_beside_a_spring_is_as_large_as_a_share_of_the_springs(name):
     recording, _ = simulate_recording("frontal_single")
     effect, model = EFFECTS[name], load_model("frontal_single")
     shape = {key: value.starts[0] for key, value in effect.shapes_of("").items()}
-    element = model.elements[0].name
-    structure = applied(add_effect(model, name, element, shape=shape), recording.test)
+    target = (model.elements if effect.acts_on == "element" else model.bodies)[0].name
+    structure = applied(add_effect(model, name, target, shape=shape), recording.test)
     (action,) = structure.actions
     typical = typical_motion(model, 0)
     force = np.abs(effect.force(typical, **shape))

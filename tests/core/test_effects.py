@@ -21,7 +21,8 @@ from crash_estimator.model_file import load_model
 
 VOCABULARY = """viscous_damping quadratic_damping coulomb_friction hysteresis maxwell_element gas_cushion
 rate_hardening cubic_stiffness clearance bottoming_out plastic_unloading load_path added_mass unmodelled_body
-constant_force channel_delay channel_gain channel_offset""".split()
+constant_force guide_friction initial_velocity channel_delay channel_gain channel_offset
+force_offset""".split()
 DAMPERS = ("viscous_damping", "quadratic_damping", "coulomb_friction")
 FORCES = [effect for effect in EFFECTS.values() if isinstance(effect, ElementForce)]
 SMALL = st.floats(-10.0, 10.0, allow_subnormal=False)
@@ -109,11 +110,12 @@ def test_the_logarithmic_rate_doubles_the_force_too_and_counts_from_its_referenc
 
 
 def test_the_limits_are_physical():
-    """Damping and stiffness never negative; a delay within 1 ms, a gain within 10 %, an offset within 5 g."""
-    signed = {"constant_force", "channel_gain", "channel_offset"}
+    """Damping and stiffness never negative; a delay within 1 ms, gains and stated speeds within 10 %, offsets 5 g."""
+    signed = {"constant_force", "initial_velocity", "channel_gain", "channel_offset", "force_offset"}
     assert {name for name, effect in EFFECTS.items() if effect.low < 0.0} == signed
     assert EFFECTS["channel_delay"].high == pytest.approx(1e-3)
     assert (EFFECTS["channel_gain"].low, EFFECTS["channel_gain"].high) == pytest.approx((-0.1, 0.1))
+    assert (EFFECTS["initial_velocity"].low, EFFECTS["initial_velocity"].high) == pytest.approx((-0.1, 0.1))
     assert EFFECTS["channel_offset"].high == pytest.approx(5.0 * 9.80665)
 
 

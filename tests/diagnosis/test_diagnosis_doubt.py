@@ -91,5 +91,5 @@ def test_an_effect_as_large_as_is_admitted_is_doubted(sign):
         return doubt(replace(one, models=(*one.models[:-1], last._replace(fit=fitted))))
 
     assert limited(1.1) == ""
-    reason = "coulomb_friction on rib_spine is as large as it may be"
+    reason = f"coulomb_friction on rib_spine is as large as it may be, {theta[place.coefficient]:g} N"
     assert limited(1.0) == f"the model itself or the recording may be wrong ({reason}): {ADVICE} ({RESTS})"

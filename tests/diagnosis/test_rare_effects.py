@@ -17,7 +17,8 @@ from crash_estimator.core.structure import EffectSpec
 from crash_estimator.model_file import ModelFile
 from crash_replay.synthetic.hidden.cases import draw_case
 
-RARE = {"maxwell_element", "gas_cushion"}
+THAT_REMEMBER = {"maxwell_element", "gas_cushion"}
+RARE = THAT_REMEMBER | {"guide_friction", "force_offset"}
 IN_RARE_FORMS = {"rate_hardening", "quadratic_damping"}
 SPEEDS = (0.75, 1.1)
 
@@ -29,7 +30,7 @@ def case(structure: str, *effects: str, seed: int = 3108):
     return ModelFile.model_validate(dict(drawn.specimen.model)).structure(), recordings, drawn.hidden
 
 
-@pytest.mark.parametrize("effect", sorted(RARE))
+@pytest.mark.parametrize("effect", sorted(THAT_REMEMBER))
 @pytest.mark.parametrize("structure", ["impactor", "dummy"])
 def test_a_rare_effect_is_named_or_a_rival_that_cannot_be_told_from_it(structure, effect):
     """Also where a common one leaves noise too, as rate hardening does in place of the cushions."""
@@ -109,7 +110,7 @@ def test_what_the_model_has_is_common_in_all_its_forms():
     target = model.elements[0].name
     specs = EffectSpec("maxwell_element", target), EffectSpec("rate_hardening", target, variant="logarithmic")
     found = common_effects(replace(model, effects=specs), EFFECTS)
-    assert EFFECTS.keys() - found.keys() == {"gas_cushion"}
+    assert EFFECTS.keys() - found.keys() == RARE - {"maxwell_element"}
     assert found["rate_hardening"].variants == ("", "logarithmic")
 
 

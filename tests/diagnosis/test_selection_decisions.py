@@ -116,7 +116,7 @@ def test_effects_are_added_one_by_one_as_long_as_they_gain_anything(monkeypatch,
     """And no more of them than the most steps there are, whatever they gain."""
     left = iter(gains)
     path, final = one_by_one(monkeypatch, 100.0, lambda before, fitted: step(before, next(left)))
-    assert len(final.additions) == len(path) - 1 == (THRESHOLDS.most_steps if added is None else added)
+    assert len(final.additions) == len(path) - 1 == (THRESHOLDS.few if added is None else added)
 
 
 @pytest.mark.parametrize(("left", "gain", "added"), [(1.0, 9.0, 0), (1.0, 11.0, 1), (1.2, 9.0, 1), (1.2, 19.0, 1)])
@@ -126,7 +126,7 @@ def test_beside_noise_a_first_effect_must_stand_out_from_none_and_a_second_one_m
     assert len(final.additions) == len(path) - 1 == added
 
 
-@pytest.mark.parametrize(("left", "fitted"), [(10000.0, [True, True, False]), (100.0, [True] * 5)])
+@pytest.mark.parametrize(("left", "fitted"), [(10000.0, [True, True, False]), (100.0, [True] * (1 + THRESHOLDS.few))])
 def test_what_is_still_far_from_noise_is_not_searched_for_more_than_is_believed(monkeypatch, left, fitted):
     """What is left is looked at, and no candidate fitted to it."""
     asked = []

@@ -75,8 +75,10 @@ def test_a_case_with_nothing_hidden_is_what_its_model_says():
 @pytest.mark.parametrize("structure", STRUCTURES)
 def test_every_effect_but_those_left_out_can_be_hidden_and_shows(structure):
     left_out = {
-        "frontal": {"load_path"}, "single": {"load_path", "added_mass"}, "side": set(), "dummy": set(),
-        "impactor": {"load_path", "added_mass", "constant_force", "channel_delay", "channel_gain", "channel_offset"},
+        "frontal": {"load_path"}, "single": {"load_path", "added_mass"}, "side": {"force_offset"},
+        "dummy": {"initial_velocity", "force_offset"},
+        "impactor": {"load_path", "added_mass", "constant_force", "guide_friction", "initial_velocity", "channel_delay",
+                     "channel_gain", "channel_offset", "force_offset"},
     }[structure]  # fmt: skip
     assert set(EFFECTS) - set(hideable(structure)) == left_out
 

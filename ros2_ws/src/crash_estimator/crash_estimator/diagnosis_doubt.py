@@ -34,7 +34,7 @@ def doubt(found: Diagnosis) -> str:
     reasons += [never_touches(name) for name in untouched(found.models[0])]
     if len(found.steps) >= STACK:
         reasons.append(f"it takes {len(found.steps)} effects to mend it")
-    reasons += [f"{name} is as large as it may be" for name in at_limit(found)]
+    reasons += [f"{name} is as large as it may be, {limit}" for name, limit in at_limit(found)]
     if not reasons:
         return ""
     check = f"check its bodies, masses and attachments, and units, signs and initial velocities ({starts(found)})"
@@ -67,14 +67,14 @@ def worst_explained(model: Model) -> tuple[str, float]:
     return worst
 
 
-def at_limit(found: Diagnosis) -> list[str]:
-    """Effects added whose coefficient has come to the largest size that is admitted."""
+def at_limit(found: Diagnosis) -> list[tuple[str, str]]:
+    """Effects added whose coefficient has come to the largest size that is admitted, and that."""
     layout, theta = found.models[-1].fit.layout, found.models[-1].fit.theta
     added = {(step.effect, step.target) for step in found.steps}
-    names = []
+    known = []
     for term in layout.terms:
         value, low, high = (of[term.coefficient] for of in (theta, layout.prior.low, layout.prior.high))
         limit = high if value > 0.0 else low
         if term.addition.key in added and limit and value / limit > AT_LIMIT:
-            names.append(" on ".join(term.addition.key))
-    return names
+            known.append((" on ".join(term.addition.key), f"{limit:g} {term.addition.effect.unit}".rstrip()))
+    return known

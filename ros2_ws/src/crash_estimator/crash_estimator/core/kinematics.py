@@ -72,6 +72,7 @@ def initial_motion(structure: Structure, test: Test) -> tuple[np.ndarray, np.nda
             carriers = [test.channels[test.index(name)].body for name in body.acceleration]
             known = [name for name in (body.name, *carriers) if name in stated]
             values[k] = 0.0 if body.fixed else stated[known[0]] if known else body.start[part]
+    both[1] *= [1.0 + body.starts_faster for body in structure.bodies]
     if not np.isfinite(both).all():
         raise ModelError("an initial velocity or displacement of the test is not a finite number")
     return both[0], both[1]

@@ -32,6 +32,7 @@ class Body:
     noise: float | None = None  # standard deviation of its equation's error, m/s^2 or N; None: found from the data
     carried_by: str | None = None  # a driven body within another one, which feels what pushes it
     start: tuple[float, float] = (0.0, 0.0)  # m, m/s at time zero, where the test does not say
+    starts_faster: float = 0.0  # share of its initial velocity, by an effect
     applied: str | None = None  # channel of a measured force on a free body, positive in the direction of travel
     displacement: str | None = None  # channel of a free body's displacement, instead of or beside its acceleration
     velocity: str | None = None  # channel of its velocity, likewise

@@ -155,6 +155,8 @@ elements:
 effects:
   - {type: coulomb_friction, element: car_engine, coefficient: 1810, shape: {speed: 0.1}}
   - {type: added_mass, body: car}
+  - {type: guide_friction, body: car, coefficient: 900, shape: {speed: 0.2}}
+  - {type: initial_velocity, body: car, coefficient: -0.02}
   - {type: channel_gain, channel: engine_ax, coefficient: 0.02}
   - {type: load_path, between: [car, engine], coefficient: 1.0e4, form: one_way}
 """

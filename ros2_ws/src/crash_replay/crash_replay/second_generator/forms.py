@@ -59,6 +59,7 @@ BODIES = {"cab": ("cab", "engine"), "side": ("rib", "spine"), "sled": ("impactor
 seen."""
 
 PUSHED = {"wall": ("car",), **BODIES}
+STRIKING = {"wall": ("car",), "cab": ("cab",), "sled": ("impactor",)}
 PATHS = {"side": ("door-spine",), "sled": ("impactor-sled",)}
 
 
@@ -140,6 +141,9 @@ FORMS: dict[str, Form] = {
     "force.constant": Form("constant_force", PUSHED, sizes.push(0.0)),
     "force.rising": Form("constant_force", PUSHED, sizes.push(0.005)),
     "body.engine": Form("unmodelled_body", {"cab": ("engine",)}, sizes.engine),
+    # a constant force is the same law until the body comes back
+    "force.guide": Form("guide_friction", PUSHED, sizes.guided, ("constant_force",), straight=True),
+    "speed.stated": Form("initial_velocity", STRIKING, sizes.misstated),
     "channel.offset": Form("channel_offset", PUSHED, sizes.as_it_is),
     "channel.drift": Form("channel_offset", PUSHED, sizes.as_it_is),
     "channel.gain": Form("channel_gain", BODIES, sizes.as_it_is),

@@ -128,9 +128,8 @@ class Sensors:
         seen = [
             b.name for b in self.setup.bodies if b.name not in self.setup.hidden_bodies and b.name != self.setup.barrier
         ]
-        at_zero = {
-            name: float(motion.v[0, i]) for i, b in enumerate(self.setup.bodies) for name in seen if name == b.name
-        }
+        of_all = zip(self.setup.bodies, self.setup.stated * motion.v[0], strict=True)
+        at_zero = {body.name: float(v) for body, v in of_all if body.name in seen}
         test = Test(title, channels, source="simulated", initial_velocity=at_zero)
         return Recording(test, time_ns, values)
 

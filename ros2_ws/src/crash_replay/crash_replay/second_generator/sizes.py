@@ -2,8 +2,8 @@
 
 The size rule: what is hidden makes a stated share of its target's peak force (12 to 35 %, a stop or a cubic term up
 to 60 % as it only begins late), taken from a run without it. A body's mass is off by 8 to 20 %; a channel's gain by 4
-to 9 %, its offset by 1.5 to 4.5 g, its delay by 0.3 to 0.8 ms, which is what a diagnosis may be asked for. Nothing
-here knows what a diagnosis finds easy.
+to 9 %, its offset by 1.5 to 4.5 g, its delay by 0.3 to 0.8 ms, a stated speed by 2 to 6 %, which is what a diagnosis
+may be asked for. Nothing here knows what a diagnosis finds easy.
 """
 
 from collections.abc import Callable
@@ -221,6 +221,18 @@ def sloshing(base: Base) -> Setup:
     setup = replace(base.setup.with_body(base.target, mass=body.mass - loose), masses={body.name: body.mass})
     hung = Joint(body.name, "loose", Straight(loose * w * w), one_way=False)
     return joined(setup, Body("loose", loose, body.v), hung.with_branch(branches.Dashpot(0.2 * loose * w)))
+
+
+def guided(base: Base) -> Setup:
+    """A sliding guide, or locked wheels: against the body's own motion, as a whole from some 0.2 m/s on."""
+    size = base.share(0.12, 0.25) * base.peaks(base.target, "").f
+    return base.setup.with_body(base.target, push=lambda t, v: -size * np.tanh(v / 0.1))
+
+
+def misstated(base: Base) -> Setup:
+    """All start 2 to 6 % faster or slower than the test says: the light barriers stand closer than was written down."""
+    real = 1.0 + base.share(0.02, 0.06) * (1.0 if base.rng.random() < 0.5 else -1.0)
+    return replace(base.setup, bodies=base.setup.faster(real), stated=1.0 / real)
 
 
 def as_it_is(base: Base) -> Setup:

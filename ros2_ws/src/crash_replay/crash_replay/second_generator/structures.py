@@ -47,6 +47,7 @@ class Setup:
     unmodelled: tuple[str, ...] = ()  # bodies that the model has not got, their channel recorded
     hidden_bodies: tuple[str, ...] = ()  # bodies that nobody sees
     plain: Mapping[str, Joint] | None = None  # the joints as the model believes them, where not as they are
+    stated: float = 1.0  # speeds that the test states, times the real ones
 
     def body(self, name: str) -> Body:
         return next(body for body in self.bodies if body.name == name)
@@ -63,9 +64,12 @@ class Setup:
         unseen = (*self.unmodelled, *self.hidden_bodies)
         return tuple(b.name for b in self.bodies if b.mass < inf and b.name not in unseen)
 
+    def faster(self, speed: float) -> tuple[Body, ...]:
+        """Its bodies at another speed: every initial velocity and driven motion times it."""
+        return tuple(_faster(body, speed) for body in self.bodies)
+
     def machine(self, speed: float) -> Machine:
-        """The test at another speed: every initial velocity and driven motion times it."""
-        return Machine(tuple(_faster(body, speed) for body in self.bodies), self.joints)
+        return Machine(self.faster(speed), self.joints)
 
     def model_text(self) -> str:
         lines = [f"name: {self.name}", "bodies:"]

@@ -26,6 +26,7 @@ class Scenario:
     before: float = 0.050  # s before it, as in NHTSA tests: its mean gives the zero offset
     rate: float = 10_000.0  # Hz
     max_step: float = MAX_STEP  # s, of the integration
+    stated: float = 1.0  # speeds that the test states, times the real ones
 
     def at_speed(self, factor: float) -> "Scenario":
         return replace(self, system=self.system.at_speed(factor))
@@ -138,7 +139,7 @@ def _test(scenario: Scenario, seed: int, readings: Sequence[Reading]) -> Test:
         channels=tuple(sensor.channel for sensor in scenario.sensors),
         title=scenario.title,
         source=f"simulated by crash_replay, seed {seed}",
-        initial_velocity={body.name: body.velocity for body in moving},
+        initial_velocity={body.name: scenario.stated * body.velocity for body in moving},
         initial_displacement={body.name: body.displacement for body in moving},
         notes=(f"standard deviation of the sensors' noise: {noise or 'none'}",),
     )

@@ -10,8 +10,11 @@ from . import (
     constant_force,
     coulomb_friction,
     cubic_stiffness,
+    force_offset,
     gas_cushion,
+    guide_friction,
     hysteresis,
+    initial_velocity,
     load_path,
     maxwell_element,
     plastic_unloading,
@@ -38,9 +41,12 @@ _FILES = (
     added_mass,
     unmodelled_body,
     constant_force,
+    guide_friction,
+    initial_velocity,
     channel_delay,
     channel_gain,
     channel_offset,
+    force_offset,
 )
 
 EFFECTS: dict[str, Effect] = {file.EFFECT.name: file.EFFECT for file in _FILES}

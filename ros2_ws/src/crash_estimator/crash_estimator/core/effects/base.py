@@ -9,15 +9,17 @@ from .kinds import (
     AttachedBody,
     BodyForce,
     BodyInertia,
+    BodyStart,
     ChannelError,
     ElementForce,
     Gap,
+    GuideForce,
     PairSpring,
     StaticFactor,
     UnloadingSlope,
 )
 
 __all__ = [
-    "Addition", "AttachedBody", "BodyForce", "BodyInertia", "ChannelError", "Effect", "ElementForce", "ElementMotion",
-    "Gap", "PairSpring", "Shape", "StaticFactor", "UnloadingSlope",
+    "Addition", "AttachedBody", "BodyForce", "BodyInertia", "BodyStart", "ChannelError", "Effect", "ElementForce",
+    "ElementMotion", "Gap", "GuideForce", "PairSpring", "Shape", "StaticFactor", "UnloadingSlope",
 ]  # fmt: skip

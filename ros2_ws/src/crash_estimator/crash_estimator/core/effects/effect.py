@@ -50,11 +50,12 @@ class Shape:
 
 
 class OwnLink(NamedTuple):
-    """A spring of an effect's own: F = c X between two bodies."""
+    """Of an effect's own, between two bodies: a spring, F = c X, or else a force as beside an element's."""
 
     ends: tuple[int, int]
     tension: bool
     origin: tuple[float, ...]  # m, crush at time zero in each recording where it counts from there; else empty
+    spring: bool = True
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,8 @@ class Effect:
     # Its place in the rest of the model
     attaches_body: ClassVar[bool] = False  # a further body, driven by the channel that is the target
     balances_momentum: ClassVar[bool] = False  # it changes what masses and forces must add up to
+    on_ground: ClassVar[bool] = False  # its link's other end
+    changes_start: ClassVar[bool] = False  # bodies start faster than the test says
     replaces: ClassVar[str] = ""  # the element's key in a model file that it takes the place of
 
     # How a diagnosis searches for it
@@ -96,6 +99,11 @@ class Effect:
     def distorts(self) -> str:
         """What it makes wrong of a channel: delay, gain or offset."""
         return ""
+
+    @property
+    def is_of_the_recording(self) -> bool:
+        """Not the structure is wrong, but what was measured or stated of its motion."""
+        return bool(self.distorts) or self.changes_start
 
     @property
     def variants(self) -> tuple[str, ...]:
@@ -157,7 +165,8 @@ class Effect:
         return None
 
     def own_link(self, addition: "Addition", index: Mapping[str, int], starts: Sequence[np.ndarray]) -> OwnLink | None:
-        """A spring of its own; starts: displacement (b,) m of the bodies at time zero of each recording."""
+        """A link of its own; index: of the bodies, the ground's too; starts: displacement (b,) m of the bodies at time
+        zero of each recording."""
         return None
 
     def mass_shares(self, addition: "Addition") -> Mapping[str, float]:
@@ -169,6 +178,10 @@ class Effect:
     ) -> tuple[str, np.ndarray] | None:
         """A body, and the force (g,) N on it for one unit; inertial(channel): acceleration (g,) of an attached body."""
         return None
+
+    def start_velocity(self, target: str, index: Mapping[str, int], velocity: np.ndarray) -> np.ndarray:
+        """(b,) m/s by which bodies start faster for one unit, of their stated velocities (b,)."""
+        raise TypeError(f"effect {self.name} is of a kind that changes no start: {type(self).__name__}")
 
     def course(self, variant: str, time: np.ndarray) -> np.ndarray:
         """(g,) of what it adds to a channel, for one unit; time (g,): s since the impact."""

@@ -9,7 +9,9 @@ Left out, because no method could name them from what is recorded:
 - the car of `single` made heavier, or its barrier's gain wrong: M a = -F and F are all that is measured, so both scale
   F alike, and its curve is free;
 - with a measured crush (`impactor`) a scale of the only equation M a = F(X, V), F free: `added_mass`, `channel_gain`;
-  a constant in it: `constant_force` is `channel_offset`; a lag in it: `channel_delay` is a damper less;
+  a constant in it: `constant_force` is `channel_offset`, and so is `guide_friction` while it goes one way; a lag in it:
+  `channel_delay` is a damper less; `initial_velocity` is not used;
+- `guide_friction` of a body that does not come back: it is a constant force then, from which it must differ by SHOWS;
 - `load_path` in a structure whose bodies are all joined already;
 - a `clearance` or other law with which the element hardly carries any more: no stiffness at all then does as well;
 - whatever moves the recorded accelerations and forces by less than SHOWS in all, beside the other effects hidden;
@@ -50,6 +52,9 @@ FOLDS = 16
 PUSH = 0.001
 """Of an element's peak force: as little as the integration resolves, for the answer is not linear for long."""
 
+FORWARD = 10.0
+"""m/s: any friction is whole there."""
+
 ON_ELEMENTS = (
     "viscous_damping", "quadratic_damping", "coulomb_friction", "hysteresis", "maxwell_element", "gas_cushion",
     "rate_hardening", "cubic_stiffness", "bottoming_out", "clearance", "plastic_unloading",
@@ -63,7 +68,8 @@ NOT_TOLD = {
     "single": {("added_mass", "car"), ("channel_gain", "barrier_fx")},
     "impactor": {
         ("added_mass", "impactor"), ("channel_gain", "impactor_ax"), ("constant_force", "impactor"),
-        ("channel_offset", "impactor_ax"), ("channel_delay", "impactor_ax"),
+        ("channel_offset", "impactor_ax"), ("channel_delay", "impactor_ax"), ("guide_friction", "impactor"),
+        ("initial_velocity", "impactor"),
     },
 }  # fmt: skip
 
@@ -80,8 +86,12 @@ def nameable(specimen: Specimen, effect: str) -> list[str]:
             found = [f"extra_a{specimen.scenario.sensors[0].channel.axis}"]
         case "channel_delay" | "channel_gain":
             found = channels["acceleration"] + channels["force"]
+        case "force_offset":
+            found = channels["force"]
         case "channel_offset":
             found = channels["acceleration"]
+        case "initial_velocity":
+            found = [b.name for b in specimen.scenario.system.bodies if b.mass and b.velocity][:1]
         case _:
             found = [b.name for b in specimen.scenario.system.bodies if b.mass]
     return [target for target in found if (effect, target) not in NOT_TOLD.get(specimen.name, ())]
@@ -111,10 +121,18 @@ def shows(bare: Specimen, effect: str, target: str, with_it: Specimen) -> bool:
         return False
     if effect in OUTSIDE and distance(nearest_inside(with_it, effect, target), with_it) < SHOWS_OUTSIDE:
         return False
+    if effect == "guide_friction" and distance(_pushed_back(bare, target, with_it), with_it) < SHOWS:
+        return False
     if (sensor := _driving(with_it, target)) is not None:
         taken = _driven_as_recorded(bare, sensor)
         return all(apart(bare, taken, besides=target) >= REMAINS for apart in (distance, _unabsorbed))
     return distance(bare, with_it) >= SHOWS
+
+
+def _pushed_back(bare: Specimen, target: str, guided: Specimen) -> Specimen:
+    """With a constant force as large as the friction of a body that moves forward."""
+    friction = guided.element("guide").force(0.0, FORWARD, 0.0)
+    return bare.with_body(target, push=lambda time: np.full(len(time), -friction))
 
 
 def distance(specimen: Specimen, other: Specimen, besides: str = "") -> float:

@@ -168,6 +168,23 @@ def constant_force(specimen, peaks, target, share, rng):
     return pushed, Hidden("constant_force", target, force, "N")
 
 
+def guide_friction(specimen, peaks, target, share, rng):
+    """Dry friction of a body on something that rests."""
+    c = 0.4 * share * peaks.acceleration[target] * specimen.body(target).mass
+    speed = float(rng.choice([0.05, 0.1, 0.2]))
+    friction = laws.coulomb_friction(c, speed)
+    guide = Element("guide", (target, "rail"), lambda crush, rate, peak: friction(crush, rate))
+    guided = _with(specimen, [Body("rail")], [guide])
+    return guided, Hidden("guide_friction", target, c, "N", {"speed": speed})
+
+
+def initial_velocity(specimen, peaks, target, share, rng):
+    """All is faster or slower than the test says, by 2 to 6 % for a nominal share."""
+    error = 0.17 * share * float(rng.choice([-1.0, 1.0]))
+    scenario = replace(specimen.scenario.at_speed(1.0 + error), stated=1.0 / (1.0 + error))
+    return replace(specimen, scenario=scenario), Hidden("initial_velocity", target, error, "")
+
+
 def channel_delay(specimen, peaks, target, share, rng):
     """0.3 to 0.8 ms for a nominal share."""
     delay = 2.3e-3 * share
@@ -188,12 +205,20 @@ def channel_offset(specimen, peaks, target, share, rng):
     return _distorted(specimen, target, lambda time, signal: signal + offset), hidden
 
 
+def force_offset(specimen, peaks, target, share, rng):
+    """2 to 7 % of the largest force for a nominal share."""
+    offset = 0.2 * share * max(peaks.force.values()) * float(rng.choice([-1.0, 1.0]))
+    hidden = Hidden("force_offset", target, offset, "N")
+    return _distorted(specimen, target, lambda time, signal: signal + offset), hidden
+
+
 VOCABULARY: Mapping[str, Hide] = {
     hide.__name__: hide
     for hide in (
         viscous_damping, quadratic_damping, coulomb_friction, hysteresis, maxwell_element, gas_cushion,
         rate_hardening, cubic_stiffness, clearance, bottoming_out, plastic_unloading, load_path, added_mass,
-        unmodelled_body, constant_force, channel_delay, channel_gain, channel_offset,
+        unmodelled_body, constant_force, guide_friction, initial_velocity, channel_delay, channel_gain, channel_offset,
+        force_offset,
     )
 }  # fmt: skip
 

@@ -37,6 +37,7 @@ class Distortion(NamedTuple):
 
 
 NO_DISTORTION = Distortion()
+NOTHING = np.zeros(0)
 
 
 def distortion(layout: Layout, theta: np.ndarray, channel: str) -> Distortion:
@@ -103,15 +104,31 @@ def true_acceleration(record: ObservedRecord, channel: str, d: Distortion) -> np
     return (recorded - d.offset(record.time)) / (1.0 + d.gain)
 
 
-def start_values(layout: Layout, record: ObservedRecord) -> tuple[np.ndarray, np.ndarray]:
+def start_values(experiment: Experiment, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(b,) initial velocities and displacements, attached bodies included."""
-    v0, x0 = list(record.initial_velocity), list(record.initial_displacement)
-    by_channel = {t.addition.target: t.addition for t in layout.terms if t.addition.effect.attaches_body}
-    for channel in layout.attached:
-        x, v = attached_start(layout.structure, record, by_channel[channel])
-        v0.append(v)
-        x0.append(x)
-    return np.array(v0), np.array(x0)
+    v0, x0 = stated_start(experiment)
+    return v0 + sum(theta[parameter] * faster for parameter, faster in start_by(experiment)), x0
+
+
+def start_by(experiment: Experiment) -> list[tuple[int, np.ndarray]]:
+    """Derivatives of the initial velocities: (parameter, (b,))."""
+    layout, _, _ = experiment
+    additions = [(term.coefficient, term.addition) for term in layout.terms if term.addition.effect.changes_start]
+    v0 = stated_start(experiment)[0] if additions else NOTHING
+    index = layout.structure.body_index
+    return [(parameter, one.effect.start_velocity(one.target, index, v0)) for parameter, one in additions]
+
+
+def stated_start(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
+    """(b,) initial velocities and displacements as the test states them."""
+    layout, record, _ = experiment
+    v0, x0 = np.zeros((2, len(layout.bodies)))
+    own = slice(len(layout.structure.bodies))
+    v0[own], x0[own] = record.initial_velocity, record.initial_displacement
+    for addition in (term.addition for term in layout.terms if term.addition.effect.attaches_body):
+        k = layout.attached[addition.target]
+        x0[k], v0[k] = attached_start(layout.structure, record, addition)
+    return v0, x0
 
 
 def measured_motion(experiment: Experiment, theta: np.ndarray) -> Trajectory:
@@ -130,6 +147,6 @@ def motion_of(experiment: Experiment, theta: np.ndarray, free: np.ndarray) -> Tr
     a = driven_motion(experiment, theta)
     for k in np.flatnonzero(layout.kind == FREE):
         a[:, k] = free[:, k]
-    v0, x0 = start_values(layout, record)
+    v0, x0 = start_values(experiment, theta)
     v, x = integrate(record.dt, a, v0, x0)
     return Trajectory(a, v, x)

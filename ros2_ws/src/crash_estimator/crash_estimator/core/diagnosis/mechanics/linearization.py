@@ -1,6 +1,6 @@
 """The equations of motion along a trajectory: what they miss (defect), and how motion and parameters change them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from ..observation.trajectory import Trajectory, measured_crush
 from ..parameterization.experiment import Experiment
 from ..parameterization.layout import DRIVEN, FREE, Layout
 from ..parameterization.terms import Link
-from .driven_motion import driven_by
+from .driven_motion import driven_by, start_by
 from .linear_system import Linear, Sampling, ranked
 from .link_force import LinkForce, link_force
 from .masses import attached_inertia, body_loads, mass_shares, masses
@@ -111,7 +111,8 @@ def linearise(
         defect[:, free] -= observer.acceleration(trajectory)[:, free]
     for own in np.flatnonzero(~driven).tolist():
         actions.acting.append((0, own, defect[:, own]))
-    linear, knots = _linear_system(experiment, forces, actions, observer.rate if observer else 0.0)
+    starts = {actions.columns.setdefault(p, 1 + len(actions.columns)): v for p, v in start_by(experiment)}
+    linear, knots = _linear_system(experiment, forces, actions, starts, observer.rate if observer else 0.0)
     every = np.concatenate([np.array(list(actions.columns), dtype=int), knots])
     return Equations(linear, sampled, rows, every, forces)
 
@@ -141,9 +142,10 @@ def _link_forces(
 
 
 def _linear_system(
-    experiment: Experiment, forces: Sequence[LinkForce], actions: _Actions, observer_rate: float
-) -> tuple[Linear, np.ndarray]:
-    """For the compiled passes; and the knots' parameters, in the order of their columns."""
+    experiment: Experiment, forces: Sequence[LinkForce], actions: _Actions, starts: Mapping[int, np.ndarray],
+    observer_rate: float,
+) -> tuple[Linear, np.ndarray]:  # fmt: skip
+    """For the compiled passes; and the knots' parameters, in the order of their columns. starts: by column, (b,)."""
     layout, record, _ = experiment
     g, n = len(record.time), len(forces)
     column, body, acts = (np.array(each) for each in zip(*actions.acting, strict=True))
@@ -152,6 +154,9 @@ def _linear_system(
     memories = [memory for f in forces for memory in f.memories]
     peaks = [f.loading & f.kp.any() for f in forces]  # none is kept that nothing hangs on
     knot, order, touched = ranked(np.array([f.knot for f in forces], np.int64).reshape(n, g, 2), layout.knots)
+    start = np.zeros((len(layout.bodies), 1 + len(actions.columns)))
+    for k, velocity in starts.items():
+        start[:, k] = velocity
     changed = np.ones(g, bool)
     changed[1:] = (np.diff(kx) != 0.0).any(axis=0) | (np.diff(kv) != 0.0).any(axis=0)
     changed[1:] |= np.abs(np.diff(record.dt)) > 1e-9 * record.step
@@ -168,6 +173,7 @@ def _linear_system(
         knot=knot,
         weight=np.array([f.weight for f in forces], float).reshape(n, g, 2),
         changed=changed,
+        start=start,
         observer=observer_rate,
         others=1 + len(actions.columns),
         column=column,

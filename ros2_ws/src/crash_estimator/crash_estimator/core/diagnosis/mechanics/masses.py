@@ -19,7 +19,9 @@ from .driven_motion import measured_motion
 
 def masses(layout: Layout, theta: np.ndarray) -> np.ndarray:
     """(b,) kg; 1 of a body without one."""
-    mass = np.array([body.mass or 1.0 for body in layout.structure.bodies] + [1.0] * len(layout.attached))
+    mass = np.ones(len(layout.bodies))
+    for k, body in enumerate(layout.structure.bodies):
+        mass[k] = body.mass or 1.0
     for k, parameter, share in mass_shares(layout):
         mass[k] += share * theta[parameter]
     return mass

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from crash_replay.onset import find_onset
 from crash_replay.recording import SI_UNIT, Recording, Test
 
 from ...derived_motion import between_samples, smoothed
@@ -20,7 +21,7 @@ from ...structure import ModelError, Structure
 from .grid import bins_of, cosines_of, grid_of, on_grid
 from .pace import longest_step
 from .tracked_motion import tracked_acceleration
-from .whitening import filtered, weights
+from .whitening import coefficients, filtered, weights
 
 FEWEST_SAMPLES = 20
 """After the impact: 2 ms at 10 kHz, five bins, in which no curve has a second slope yet."""
@@ -94,9 +95,13 @@ class ObservedRecord(NamedTuple):
         """Noise stands for what a model leaves, not for the sensors' alone."""
         return self.whitener is not None
 
-    def whitened(self, binned: np.ndarray) -> np.ndarray:
-        """Outputs in bins (bins, q, ...), in units of noise, as if that were white, in the band that is compared."""
-        binned = binned if self.weight is None else filtered(binned, self.weight)
+    def whitened(self, binned: np.ndarray, in_time: bool = True) -> np.ndarray:
+        """Outputs in bins (bins, q, ...), in units of noise, as if that were white, in the band that is compared.
+
+        Not in time: their cosine coefficients where there are any, which have the same sums of products.
+        """
+        if self.weight is not None:
+            binned = (filtered if in_time else coefficients)(binned, self.weight)
         return self.whitener @ binned if self.noise_is_inflated else binned
 
     def in_band(self, below: float) -> "ObservedRecord":
@@ -183,7 +188,8 @@ def observe(structure: Structure, recording: Recording) -> ObservedRecord:
     outputs = outputs_of(structure)
     names = [name for _, name, _ in structure.channels()]
     names += [c.name for c in recording.test.channels if c.quantity == "acceleration"]
-    signals = {name: _signal(recording, name, time) for name in dict.fromkeys(names)}
+    rest = _rest_ends(recording)
+    signals = {name: _signal(recording, name, time, rest) for name in dict.fromkeys(names)}
     start = np.array([kinematics.initial_displacement, kinematics.initial_velocity])
     for k, body in enumerate(structure.bodies):
         if body.applied:
@@ -222,18 +228,24 @@ def observe(structure: Structure, recording: Recording) -> ObservedRecord:
     return record.in_band(np.inf)
 
 
-def _signal(recording: Recording, name: str, grid: np.ndarray) -> Signal:
+def _rest_ends(recording: Recording) -> int:
+    """ns: until when nothing moves, the stated time zero or an earlier onset; motion is no noise of a sensor's."""
+    onset = find_onset(recording)
+    return min(0, onset.time_ns - onset.precision_ns) if onset and onset.differs else 0
+
+
+def _signal(recording: Recording, name: str, grid: np.ndarray, rest_ends: int) -> Signal:
     values = recording.column(name)
     valid = np.isfinite(values)
     if not valid.any():
         raise ModelError(f"test {recording.test.id}: channel {name} has no valid sample")
     channel = recording.test.channels[recording.test.index(name)]
-    before = valid & (recording.time_ns < 0)
+    before = valid & (recording.time_ns < rest_ends)
     count = np.count_nonzero(before)
     rests = channel.quantity in ("acceleration", "force")
     offset = float(values[before].mean()) if rests and count else 0.0
     bridged = np.interp(recording.time_ns, recording.time_ns[valid], values[valid]) - offset
-    noise = sensor_noise(bridged, recording.time_ns, rests)
+    noise = sensor_noise(bridged, recording.time_ns - rest_ends, rests)
     bridged = noise.unfiltered(bridged)
     values = np.interp(grid, recording.time, bridged)
     return Signal(recording.time, bridged, values, noise, noise.std / np.sqrt(count) if count else 0.0)

@@ -24,7 +24,11 @@ def weights(
     return np.stack(found, axis=1)
 
 
+def coefficients(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Of values (n, q, ...), weighted by (n, q): their sums of squares and products are those of what is `filtered`."""
+    return weight.reshape(*weight.shape, *[1] * (values.ndim - 2)) * dct(values, axis=0, norm="ortho")
+
+
 def filtered(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """values (n, q, ...) with their coefficients weighted by (n, q)."""
-    weight = weight.reshape(*weight.shape, *[1] * (values.ndim - 2))
-    return idct(weight * dct(values, axis=0, norm="ortho"), axis=0, norm="ortho")
+    return idct(coefficients(values, weight), axis=0, norm="ortho")

@@ -27,11 +27,8 @@ from .sensitivity_equations import respond
 MOST_ITERATIONS = 20
 """Of which the stages of `FROM_MEASURED_MOTION` are some; longer schedules come on top."""
 
-LEAST = 5
-"""Iterations before a fit is given up as hopeless."""
-
-MOST_HALVINGS = 5
-"""Of a step that has made it worse: a thirty-second of it is left then."""
+PATIENCE = 5
+"""Iterations: before a fit is given up as hopeless, and that halve a step which has made it worse, to a 32nd."""
 
 LONGEST_SHAPE_STEP = 0.35
 """Of the logarithm of a shape constant in one iteration: its derivatives hold for a factor of 1.4, not for one of 3."""
@@ -43,7 +40,8 @@ COARSE = 1e-3
 """... or as a share of what the cost exceeds that of a fit at the noise floor by: a misfit needs no precision."""
 
 CIRCLES = 4
-"""Iterations in which the cost finds no new least by as much: it goes around a kink of the forces."""
+"""Iterations in which the cost finds no new least by as much: it goes around a kink of the forces. With five, one of a
+bag's two unloading lines was told as hysteresis."""
 
 
 class Step(NamedTuple):
@@ -148,7 +146,7 @@ def fit(
     """Fit from the measured motion, or from a given point.
 
     schedule: stages before the free run, `FROM_MEASURED_MOTION` where none are given and the fit starts from that;
-    hopeless: cost above which, after LEAST iterations, it is not worth going on; most: iterations; held: parameters
+    hopeless: cost above which, after PATIENCE iterations, it is not worth going on; most: iterations; held: parameters
     that stay as they start.
     """
     layout = problem.layout
@@ -174,7 +172,7 @@ def fit(
         except LinAlgError:
             step = None
         worse = step is None or (last_good is not None and step.before > last_good[1].before + 1.0)
-        if worse and last_good is not None and halvings < MOST_HALVINGS:
+        if worse and last_good is not None and halvings < PATIENCE:
             halvings += 1
             point = _half_way_back(problem, last_good[0], point)
             continue
@@ -194,7 +192,7 @@ def fit(
         ]
         point = Point(point.theta + delta, moved)
         change, last = abs(last - step.after) if stage == FREE_RUN else np.inf, step.after
-        if stage == FREE_RUN and (change < enough or (iteration >= LEAST and step.after - change > hopeless)):
+        if stage == FREE_RUN and (change < enough or (iteration >= PATIENCE and step.after - change > hopeless)):
             break
         if circles >= CIRCLES or iteration >= most:
             break

@@ -64,7 +64,7 @@ def _summed(so_far: Normal, experiment: Experiment, theta, trajectory, equations
     """With one experiment more; the matrix and the vector are added to in place."""
     matrix, vector, cost, samples, grown = so_far
     record = experiment.record
-    flat = whitened(experiment, theta, trajectory, equations, observer)
+    flat = whitened(experiment, theta, trajectory, equations, observer, in_time=False)
     flat = flat.reshape(-1, flat.shape[-1])
     products = flat.T @ flat
     _put(equations.columns, products, matrix, vector)
@@ -94,9 +94,12 @@ def _filled(record: ObservedRecord) -> np.ndarray:
 
 def whitened(
     experiment: Experiment, theta: np.ndarray, trajectory: Trajectory, equations: Equations,
-    observer: Observer | None = None,
+    observer: Observer | None = None, in_time: bool = True,
 ) -> np.ndarray:  # fmt: skip
-    """(bins, q, 1 + columns): whitened binned residual corrected for the defect, then its derivative."""
+    """(bins, q, 1 + columns): whitened binned residual corrected for the defect, then its derivative.
+
+    in_time: `ObservedRecord.whitened`.
+    """
     layout, record, _ = experiment
     out = np.zeros((record.bins, len(layout.outputs), 1 + len(equations.columns)))
     propagate(equations.linear, equations.sampling, out)
@@ -111,7 +114,7 @@ def whitened(
         along += np.where(layout.kind == FREE, observer.acceleration(trajectory), 0.0)
     misfit = record.on_grid - predicted(experiment, theta, along, trajectory)
     out[:, :, 0] = binned(record, weight * misfit) - out[:, :, 0]
-    return record.whitened(out)
+    return record.whitened(out, in_time)
 
 
 def binned(record: ObservedRecord, values: np.ndarray) -> np.ndarray:

@@ -4,13 +4,14 @@ Parameters stand in this order: forces at the curves' knots, then constants of e
 recording the nuisances (errors and drifts of its outputs' zeros, slow errors of its driven motions).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...effects.effect import Addition
+from ...effects.kinds.guide_force import GROUND
 from ...structure import Coefficient, Structure
 from ..observation.grid import DRIVEN_MODES
 from ..observation.record import ObservedRecord, Output, comparable, outputs_of
@@ -45,7 +46,7 @@ class Layout(NamedTuple):
 
     structure: Structure
     links: tuple[Link, ...]
-    bodies: tuple[str, ...]  # the structure's, then attached ones
+    bodies: tuple[str, ...]  # the structure's, then attached ones, then the ground where something slides on it
     kind: np.ndarray  # (b,) FREE, DRIVEN or FIXED
     outputs: tuple
     knots: int  # parameters that are forces at knots
@@ -86,26 +87,22 @@ def make_layout(
     """roughness: of curves, by their link's name, where it is not the usual one (`free_curve.adapted_roughness`)."""
     roughness = roughness or {}
     b = Builder()
-    index = structure.body_index
-    bodies = [body.name for body in structure.bodies]
-    kind = [FREE if body.free else DRIVEN if body.driven else FIXED for body in structure.bodies]
+    bodies, kind = zip(*_bodies(structure, additions), strict=True)
+    index = {name: k for k, name in reversed(list(enumerate(bodies)))}
     curves: list[Curve | None] = []
     for k, element in enumerate(structure.elements):
         wanted = element.stiffness.estimated and element.stiffness.shape == "curve"
         curves.append(_element_curve(b, k, element, magnitudes, roughness) if wanted else None)
-    attached, touching = {}, []
+    channels = dict.fromkeys(one.target for one in additions if one.effect.attaches_body)
+    attached = {channel: len(structure.bodies) + k for k, channel in enumerate(channels)}
+    touching = []
     for addition in additions:
-        if addition.effect.attaches_body:
-            if addition.target not in attached:
-                attached[addition.target] = len(bodies)
-                bodies.append(addition.target)
-                kind.append(DRIVEN)
-            if addition.touches:
-                at, crush = magnitudes.touching(addition)
-                force = magnitudes.host_force(addition)
-                name = _touch_name(addition)
-                curve = b.curve(name, at, crush, force, roughness.get(name, ROUGHNESS), 0.0)
-                touching.append((addition, curve))
+        if addition.effect.attaches_body and addition.touches:
+            at, crush = magnitudes.touching(addition)
+            force = magnitudes.host_force(addition)
+            name = _touch_name(addition)
+            curve = b.curve(name, at, crush, force, roughness.get(name, ROUGHNESS), 0.0)
+            touching.append((addition, curve))
     knots = len(b.start)
     links, terms = [], []
     for k, element in enumerate(structure.elements):
@@ -115,8 +112,8 @@ def make_layout(
         own = addition.effect.own_link(addition, index, starts)
         if own is not None:
             terms.append(_term(b, addition, magnitudes))
-            stiffness = terms[-1].coefficient
-            links.append(Link(addition.target, own.ends, own.ends, own.tension, constant=stiffness, origin=own.origin))
+            what = {"constant": terms[-1].coefficient} if own.spring else {"terms": (terms[-1],)}
+            links.append(Link(addition.target, own.ends, own.ends, own.tension, origin=own.origin, **what))
     for addition, curve in touching:
         links.append(
             Link(
@@ -143,10 +140,20 @@ def make_layout(
         modes.append(_modes(b, structure, record, attached))
         kicks.append(_kicks(b, structure, magnitudes.measured[r]))
     return Layout(
-        structure, tuple(links), tuple(bodies), np.array(kind), outputs, knots, common, len(b.start), tuple(terms),
+        structure, tuple(links), bodies, np.array(kind), outputs, knots, common, len(b.start), tuple(terms),
         attached, tuple(offsets), tuple(drifts), tuple(modes), tuple(kicks), weighed, b.prior(), np.array(b.start),
         tuple(b.names[knots:common]),
     )  # fmt: skip
+
+
+def _bodies(structure: Structure, additions: Sequence[Addition]) -> Iterator[tuple[str, int]]:
+    """The structure's own and their kinds, then attached ones, then the ground where something slides on it."""
+    for body in structure.bodies:
+        yield body.name, FREE if body.free else DRIVEN if body.driven else FIXED
+    for channel in dict.fromkeys(one.target for one in additions if one.effect.attaches_body):
+        yield channel, DRIVEN
+    if GROUND not in structure.body_index and any(one.effect.on_ground for one in additions):
+        yield GROUND, FIXED
 
 
 def _touch_name(addition: Addition) -> str:

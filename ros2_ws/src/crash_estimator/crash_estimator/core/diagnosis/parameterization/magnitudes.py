@@ -45,11 +45,18 @@ class Magnitudes(NamedTuple):
     def largest_crush(self, element: str) -> float:
         return max(float(self.crush_range[self.element(element), 1]), 1e-4)
 
+    def largest_rate(self, target: str) -> float:
+        """m/s: of an element, while it may carry, or of a body."""
+        body = self.structure.body_index.get(target)
+        if body is None or target in (element.name for element in self.structure.elements):
+            return float(self.rate[self.element(target)])
+        return max(float(np.abs(motion.v[:, body]).max()) for motion in self.measured)
+
     def shape_unit(self, shape: Shape, target: str) -> float:
         """What a shape constant's limits and starts are shares of."""
         if shape.of_crush:
             return self.largest_crush(target)
-        return min(float(self.rate[self.element(target)]) / FAST, 1.0) if shape.of_rate else 1.0
+        return min(self.largest_rate(target) / FAST, 1.0) if shape.of_rate else 1.0
 
     def crushed_elements(self) -> list[Element]:
         """Elements that are crushed at all: of the others nothing can be told."""

@@ -154,7 +154,7 @@ def _from_a_sharper_time_zero(
     used = {shift.recording: shift.seconds for shift in zero.shifts} if zero else {}
     shifts = tuple(shift._replace(seconds=used.get(shift.recording, 0.0)) for shift in begins)
     as_stated = zero.as_stated if zero else found.steps[0].before
-    most = len(found.added) - 1 if found.noise else THRESHOLDS.most_steps  # effects that would be an improvement
+    most = len(found.added) - 1 if found.noise else THRESHOLDS.few  # effects that would be an improvement
 
     def observed(shifts: Sequence[Shift]) -> list[ObservedRecord]:
         return _from(structure, recordings, shifts)

@@ -109,7 +109,7 @@ def _normal_equations(fitted: Fit, free: np.ndarray) -> Normal:
         modes = np.cos(np.pi * np.arange(1, MODES + 1) * (experiment.record.time / longest)[:, None])
         equations = linearise(experiment, fitted.theta, trajectory)
         equations = _with_motion(equations, modes, free, layout.size)
-        out = whitened(experiment, fitted.theta, trajectory, equations)
+        out = whitened(experiment, fitted.theta, trajectory, equations, in_time=False)
         flat = np.concatenate([out, _of_sensors(experiment, fitted.theta, trajectory, equations, modes)], axis=2)
         flat = flat.reshape(-1, flat.shape[-1])
         products = flat.T @ flat
@@ -128,6 +128,7 @@ def _with_motion(equations: Equations, modes: np.ndarray, free: np.ndarray, firs
     acts = (acts[:, None] * modes.T).reshape(-1, len(modes))
     more, others = np.arange(len(acts)), linear.others
     wider = linear._replace(
+        start=np.pad(linear.start, ((0, 0), (0, len(acts)))),
         others=others + len(acts),
         column=np.concatenate([linear.column, others + more]),
         body=np.concatenate([linear.body, np.tile(np.repeat(free, MODES), 2)]),
@@ -148,4 +149,4 @@ def _of_sensors(
     for n in range(q):
         column = (equations.sampling.weight[:, n] * shown[:, n])[:, None] * modes
         np.add.at(found[:, n, n], record.bin[record.at], column[record.at])
-    return record.whitened(found.reshape(record.bins, q, -1))
+    return record.whitened(found.reshape(record.bins, q, -1), in_time=False)

@@ -166,7 +166,7 @@ def _likely(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]]:
     fitted = [one for one in first.as_recorded if one.fit]
     if path.final.white:
         fitted = [one for one in fitted if one.gain > (1.0 - THRESHOLDS.least_share) * fitted[0].gain]
-    for one in fitted[: THRESHOLDS.with_care]:
+    for one in fitted[: THRESHOLDS.few]:
         yield (*first.before.additions, as_found(one)), one.fit
 
 

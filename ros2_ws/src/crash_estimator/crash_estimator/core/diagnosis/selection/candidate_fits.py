@@ -115,7 +115,7 @@ class _Search:
         for one in self.screened:
             if one.addition.key == addition.key:
                 hosts.setdefault(one.addition.host, one.addition)
-        for host in list(hosts.values())[: THRESHOLDS.most_hosts]:
+        for host in list(hosts.values())[: THRESHOLDS.few]:
             for variant in host.effect.extensions(self.magnitudes.structure, host):
                 self._fit(variant)
         best = self.found[addition.key].addition
@@ -162,7 +162,7 @@ class _Search:
             self._note(rival.addition, on)
 
     def _best(self) -> list[CandidateFit]:
-        return [one for one in self.ranking() if one.fit][: THRESHOLDS.with_care]
+        return [one for one in self.ranking() if one.fit][: THRESHOLDS.few]
 
     def _fit(
         self, addition: Addition, screened: Screened | None = None, schedule: Schedule = FROM_MEASURED_MOTION

@@ -75,7 +75,7 @@ def _one_by_one(
             model, path = fair, path[:-1]
             continue
         needed = needed_gain(model.white, len(model.additions) - present)
-        if done.best is None or done.best.gain < needed or len(path) > THRESHOLDS.most_steps:
+        if done.best is None or done.best.gain < needed or len(path) > THRESHOLDS.few:
             # where the noise had to be taken larger, the model before the step is the one fitted with it
             return without_the_superseded(magnitudes, path, done.before, present)
         magnitudes, larger = added(magnitudes, model.records, model, done.best)

@@ -47,10 +47,10 @@ def two_of_one_effect(magnitudes: Magnitudes, model: Model, candidates: Sequence
             alike.setdefault(one.addition.effect.name, []).append(one)
     several = [places for places in alike.values() if len(places) > 1 and _likely(places[:1])]
     found = []
-    for first, *others in several[: THRESHOLDS.most_alike]:
+    for first, *others in several[: THRESHOLDS.shortlist]:
         larger = added(magnitudes, model.records, model, first, on_trial=True)[1]
         pairs = (_together(magnitudes, candidates, model, first, larger, o.addition) for o in others)
-        found += [pair for pair in islice(pairs, THRESHOLDS.most_hosts) if pair]
+        found += [pair for pair in islice(pairs, THRESHOLDS.few) if pair]
     return found
 
 
@@ -104,7 +104,7 @@ def _likely(candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
 def _one_after_the_other(magnitudes: Magnitudes, effects, model: Model, candidates, followed) -> Iterator[Pair]:
     """The likeliest first ones, each with the best second one."""
     records = model.records
-    for first in _likely(candidates)[: THRESHOLDS.with_care]:
+    for first in _likely(candidates)[: THRESHOLDS.few]:
         if first.addition.key == followed or analyse(first.fit).mean_square >= THRESHOLDS.real_structure:
             continue
         wider, larger = added(magnitudes, records, model, first, on_trial=True)

@@ -80,7 +80,7 @@ def weighed(
     if done.leaves_noise:
         return done
     fitted = any(one.fit for one in found)
-    for _ in range(THRESHOLDS.inflations):
+    for _ in range(THRESHOLDS.few):
         if out_of_time():
             break
         noisier = _noise_left_by(done, model.records)
@@ -94,7 +94,8 @@ def weighed(
         if before.white:  # so it looks; the sensors' own noise decides
             decided = analyse(fit(model.fit.problem, before.fit.point), sharply=True).band_test
             before = before._replace(residuals=before.residuals._replace(band_test=decided))
-        others = fit_candidates(magnitudes, effects, before, in_other_noise=found, fitted=fitted)
+        tried = found if done.candidates is found else [*done.candidates[:1], *found]
+        others = fit_candidates(magnitudes, effects, before, in_other_noise=tried, fitted=fitted)
         done = SelectionStep(before, others, found)
     known = [evenly] if evenly else []
     return done._replace(evenly=evenly_fitted(done.before, band_of_steps([*path, done]), *known))
@@ -142,7 +143,7 @@ def added(
         larger = fit_model(magnitudes, records, additions, start)
         return magnitudes, larger if larger.white or on_trial else larger.best_of((SMALL_STEPS, LARGE_NOISE))
 
-    if not best.addition.effect.distorts:
+    if not best.addition.effect.is_of_the_recording:
         return fitted(magnitudes, best.fit.point)
     # the measured motion was wrong, and with it the crushes that the curves reach over
     mended = measure_magnitudes(magnitudes.structure, records, magnitudes.cells, best.fit.trajectories)

@@ -24,6 +24,7 @@ from ..observation.record import ObservedRecord
 from ..output_error.normal_equations import may_diverge
 from ..parameterization.magnitudes import measure_magnitudes
 from ..parameterization.model_terms import additions_of
+from ..residuals.residuals import rms
 from .assumptions import CELLS
 from .fitted_model import Model, fit_model
 from .thresholds import THRESHOLDS
@@ -53,9 +54,15 @@ class TimeZero(NamedTuple):
     as_stated: Model  # fitted from the stated time zero on
 
     def gain(self, moved: Model) -> float:
-        """Nats: the likelihood of the errors of both, in noise as large as each leaves; a bin counts once."""
-        bins = sum(record.bins * record.measured.shape[1] for record in moved.records)
-        return float(bins * np.log(self.as_stated.residuals.rms / moved.residuals.rms))
+        """Nats: the likelihood of the errors of both, in noise as large as each leaves; a bin counts once.
+
+        Of the same samples: those before the stated zero are quiet, and any model leaves little of them.
+        """
+        bins = sum(record.bins * record.measured.shape[1] for record in self.as_stated.records)
+        begins = {shift.recording: -shift.seconds for shift in self.shifts}
+        pairs = zip(moved.records, moved.residuals.residual, strict=True)
+        of_both = [left[record.time[record.at] >= begins.get(k, 0.0)] for k, (record, left) in enumerate(pairs)]
+        return float(bins * np.log(self.as_stated.residuals.rms / rms(moved.fit.layout, of_both)))
 
 
 def onsets(recordings: Sequence[Recording], as_well: bool = False) -> tuple[Shift, ...]:
@@ -85,14 +92,14 @@ def time_zero_wrong(
     shifts: tuple[Shift, ...],
     effects: Mapping[str, Effect],
 ) -> TimeZero | None:
-    """None where the model as given leaves hardly less of the moved recordings."""
-    models = []
-    for records in (stated, moved):
+    """None where the model as given leaves noise only, or hardly less of the moved recordings."""
+
+    def given(records: Sequence[ObservedRecord]) -> Model:
         magnitudes = measure_magnitudes(structure, records, CELLS)
-        models.append(fit_model(magnitudes, records, additions_of(structure, magnitudes, effects)))
-    as_stated, from_onset = models
-    zero = TimeZero(shifts, as_stated)
-    return zero if zero.gain(from_onset) > THRESHOLDS.gain else None
+        return fit_model(magnitudes, records, additions_of(structure, magnitudes, effects))
+
+    zero = TimeZero(shifts, given(stated))
+    return zero if not zero.as_stated.white and zero.gain(given(moved)) > THRESHOLDS.gain else None
 
 
 @may_diverge

@@ -3,15 +3,17 @@
 from .attached_body import AttachedBody
 from .body_force import BodyForce
 from .body_inertia import BodyInertia
+from .body_start import BodyStart
 from .channel_error import ChannelError
 from .element_force import ElementForce
 from .gap import Gap
+from .guide_force import GuideForce
 from .pair_spring import PairSpring
 from .remembering_force import RememberingForce
 from .static_factor import StaticFactor
 from .unloading_slope import UnloadingSlope
 
 __all__ = [
-    "AttachedBody", "BodyForce", "BodyInertia", "ChannelError", "ElementForce", "Gap", "RememberingForce", "PairSpring",
-    "StaticFactor", "UnloadingSlope",
+    "AttachedBody", "BodyForce", "BodyInertia", "BodyStart", "ChannelError", "ElementForce", "Gap", "GuideForce",
+    "PairSpring", "RememberingForce", "StaticFactor", "UnloadingSlope",
 ]  # fmt: skip

@@ -1,0 +1,49 @@
+"""A force that holds a body back on the ground, a guide or a rail, however far it has come."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from ...structure import Body, Coefficient, Element
+from ..effect import OwnLink
+from .element_force import HALF, ElementForce, on_element
+
+GROUND = "ground"
+"""A fixed body of this name, which is added where the model has none."""
+
+PUSHED = 6.0
+"""Nats that it must gain over a constant force, as any candidate over nothing: on a body that never comes back the two
+are the same."""
+
+
+@dataclass(frozen=True)
+class GuideForce(ElementForce):
+    """The force of an element without a spring between a free body and the ground: c f, against the body's motion."""
+
+    acts_on: ClassVar[str] = "body"
+    on_ground: ClassVar[bool] = True
+
+    def possible_targets(self, structure, test):
+        return [body.name for body in structure.bodies if body.free and body.name != GROUND]
+
+    def put_to_work(self, structure, test, spec):
+        ground = () if GROUND in structure.body_index else (Body(GROUND, fixed=True),)
+        guide = Element(f"{spec.target}-{GROUND}", (spec.target, GROUND), Coefficient(0.0, shape="constant"))
+        guided = replace(structure, bodies=(*structure.bodies, *ground), elements=(*structure.elements, guide))
+        return super().put_to_work(guided, test, replace(spec, target=guide.name))
+
+    def own_link(self, addition, index, starts):
+        return OwnLink((index[addition.target], index[GROUND]), tension=True, origin=(), spring=False)
+
+    def candidates(self, structure, magnitudes):
+        """On bodies that no element holds to a fixed one both ways: beside that it is a force of its own."""
+        fixed = {body.name for body in structure.bodies if body.fixed}
+        held = {name for e in structure.elements if e.tension and fixed & set(e.between) for name in e.between}
+        for name in self.possible_targets(structure, None):
+            if name not in held:
+                yield from on_element(self, magnitudes, name)
+
+    def prior_std(self, magnitudes, addition):
+        return HALF * magnitudes.body_force[magnitudes.structure.body_index[addition.target]]
+
+    def log_prior_odds_against(self, structure):
+        return PUSHED
