@@ -79,7 +79,7 @@ def weighed(
     model, found = done.before, done.candidates
     if done.leaves_noise:
         return done
-    fitted = any(one.fit for one in found)
+    fits = {one.addition.key for one in found if one.fit}
     for _ in range(THRESHOLDS.few):
         if out_of_time():
             break
@@ -94,8 +94,9 @@ def weighed(
         if before.white:  # so it looks; the sensors' own noise decides
             decided = analyse(fit(model.fit.problem, before.fit.point), sharply=True).band_test
             before = before._replace(residuals=before.residuals._replace(band_test=decided))
-        tried = found if done.candidates is found else [*done.candidates[:1], *found]
-        others = fit_candidates(magnitudes, effects, before, in_other_noise=tried, fitted=fitted)
+        # what has come up in a larger noise is gone on from in the next, but where a jump would hold it where it is
+        new = [o for o in done.candidates[:1] if o.addition.key not in fits and not o.addition.effect.profiled]
+        others = fit_candidates(magnitudes, effects, before, in_other_noise=[*new, *found], fitted=bool(fits))
         done = SelectionStep(before, others, found)
     known = [evenly] if evenly else []
     return done._replace(evenly=evenly_fitted(done.before, band_of_steps([*path, done]), *known))
