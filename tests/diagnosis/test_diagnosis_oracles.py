@@ -102,6 +102,7 @@ EVERY_EFFECT = (
     EffectSpec("bottoming_out", "foam", 8.0e4, {"stop": 0.08}),
     EffectSpec("plastic_unloading", "foam", 2.5e5),
     EffectSpec("load_path", "striker-wall", 1.0e4),
+    EffectSpec("load_path", "striker-wall", 4.0e4, {"gap": 0.08}, variant="late"),
     EffectSpec("added_mass", "plate", 8.0),
     EffectSpec("constant_force", "striker", 900.0),
     EffectSpec("constant_force", "striker", 900.0, {"rise": 0.011}, variant="rising"),

@@ -1,4 +1,4 @@
-"""What is stated or measured wrong: a speed, a load cell's zero, a time zero; and friction that no element carries."""
+"""What is stated or measured wrong: a speed, a load cell's zero, a time zero; and forces that no element carries."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -74,6 +74,15 @@ def test_friction_on_the_ground_is_named_without_an_element_for_it():
     (step,) = found.steps
     assert (found.verdict, found.complete) == ("effect_missing", True)
     assert (step.effect, step.target) == ("guide_friction", "car")
+
+
+def test_a_part_that_is_reached_on_the_way_is_named_with_its_gap():
+    """It led the ranking, and was unexplained: no spring from time zero on follows it."""
+    found = diagnose(*case("sled/path.slack/1g/clean/71983002"))
+    (step,) = found.steps
+    assert (found.verdict, found.complete) == ("effect_missing", True)
+    assert (step.effect, step.target, step.form) == ("load_path", "impactor-sled", "late")
+    assert step.shape["gap"] > 0.01
 
 
 def test_what_an_element_to_a_wall_may_carry_is_not_offered_on_the_ground_as_well():

@@ -106,6 +106,9 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
     if link.curve is None and link.constant is not None:
         parameters.append(link.constant)
         columns.append(at * carries * factor)
+    if link.gap is not None:
+        parameters.append(link.gap)
+        columns.append(-law.gap * kx)
 
     for one in inside:
         parameters += one.parameters
@@ -172,7 +175,8 @@ def _law(link: Link, theta: np.ndarray) -> Law:
     elif link.constant is not None:
         stiffness = theta[link.constant]
     slope = link.unloading
-    law = Law(0.0, False, slope is not None, float(slope or 0.0), *curve, float(stiffness), not link.tension)
+    gap = 0.0 if link.gap is None else float(np.exp(theta[link.gap]))
+    law = Law(gap, False, slope is not None, float(slope or 0.0), *curve, float(stiffness), not link.tension)
     for term in link.in_law:
         law = term.addition.effect.changed_law(law, float(theta[term.coefficient]), term.addition.variant)
     return law

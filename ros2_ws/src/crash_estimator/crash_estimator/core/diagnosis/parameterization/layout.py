@@ -112,7 +112,9 @@ def make_layout(
         own = addition.effect.own_link(addition, index, starts)
         if own is not None:
             terms.append(_term(b, addition, magnitudes))
-            what = {"constant": terms[-1].coefficient} if own.spring else {"terms": (terms[-1],)}
+            term = terms[-1]
+            spring = {"constant": term.coefficient, "gap": term.shapes.get("gap")}
+            what = spring if own.spring else {"terms": (term,)}
             links.append(Link(addition.target, own.ends, own.ends, own.tension, origin=own.origin, **what))
     for addition, curve in touching:
         links.append(

@@ -51,6 +51,7 @@ class Link:
     acts_when_spent: str = NOTHING  # beside a spring whose unloading line has come down to zero
     curve: Curve | None = None
     constant: int | None = None
+    gap: int | None = None  # logarithm of m, before it carries
     known_stiffness: float = 0.0
     damping: int | None = None
     known_damping: float = 0.0

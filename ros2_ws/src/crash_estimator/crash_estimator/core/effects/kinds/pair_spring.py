@@ -18,11 +18,15 @@ class PairSpring(Effect):
     """An element of its own between two bodies that are not joined: F = c X.
 
     Its variants: it carries both ways, its crush counted from time zero (""), or from where its bodies' displacements
-    agree (absolute); or compression only, with the second body before the first (one_way), or behind (one_way_back).
+    agree (absolute); or compression only, with the second body before the first (one_way), or behind (one_way_back);
+    or likewise once they have come closer than at time zero by a gap that is found (late, late_back).
     """
 
     acts_on: ClassVar[str] = "between"
-    variants: ClassVar[tuple[str, ...]] = ("", "absolute", "one_way", "one_way_back")
+    variants: ClassVar[tuple[str, ...]] = ("", "absolute", "one_way", "one_way_back", "late", "late_back")
+
+    def shapes_of(self, variant):
+        return self.shapes if variant.startswith("late") else {}
 
     def possible_targets(self, structure, test):
         return [f"{a.name}-{b.name}" for a, b in permutations(structure.bodies, 2) if a.free or b.free]
@@ -35,19 +39,21 @@ class PairSpring(Effect):
             tuple(structure.bodies[k].name for k in link.ends),
             replace(coefficient_of(spec, self), shape="constant"),
             tension=link.tension,
-            origin=link.origin[0] if link.origin else 0.0,
+            origin=(link.origin[0] if link.origin else 0.0) + spec.shape.get("gap", 0.0),
         )
         return replace(structure, elements=(*structure.elements, element))
 
     def own_link(self, addition, index, starts):
         ends = ends_of(addition.target, index)
-        if addition.variant == "one_way_back":
+        if addition.variant.endswith("_back"):
             ends = ends[::-1]
-        origin = () if addition.variant else tuple(float(x[ends[0]] - x[ends[1]]) for x in starts)
-        return OwnLink(ends, not addition.variant.startswith("one_way"), origin)
+        from_zero = not addition.variant or addition.variant.startswith("late")
+        origin = tuple(float(x[ends[0]] - x[ends[1]]) for x in starts) if from_zero else ()
+        return OwnLink(ends, addition.variant in ("", "absolute"), origin)
 
     def candidates(self, structure, magnitudes):
-        """Both ways, counted from time zero or not, and one way where the bodies come close enough to touch."""
+        """Both ways, counted from time zero or not, and one way where the bodies come close enough to touch, at once or
+        later."""
         joined = {frozenset(element.between) for element in structure.elements}
         starts = [record.initial_displacement for record in magnitudes.records]
         for (i, a), (k, b) in combinations(enumerate(structure.bodies), 2):
@@ -61,6 +67,13 @@ class PairSpring(Effect):
             for variant, reach in (("one_way", crush), ("one_way_back", -crush)):
                 if reach.max() > 0.0 and reach.min() < 0.0:
                     yield Addition(self, target, variant=variant)
+            closer = crush - np.concatenate(
+                [np.full(len(m.x), x[i] - x[k]) for m, x in zip(magnitudes.measured, starts)]
+            )
+            for variant, reach in (("late", closer), ("late_back", -closer)):
+                for gap in self.shapes["gap"].starts:
+                    if reach.max() > gap:
+                        yield Addition(self, target, {"gap": gap}, variant=variant)
 
     def prior_std(self, magnitudes, addition):
         a, b = ends_of(addition.target, magnitudes.structure.body_index)
