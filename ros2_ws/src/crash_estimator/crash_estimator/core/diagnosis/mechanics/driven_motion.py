@@ -37,7 +37,6 @@ class Distortion(NamedTuple):
 
 
 NO_DISTORTION = Distortion()
-NOTHING = np.zeros(0)
 
 
 def distortion(layout: Layout, theta: np.ndarray, channel: str) -> Distortion:
@@ -113,10 +112,11 @@ def start_values(experiment: Experiment, theta: np.ndarray) -> tuple[np.ndarray,
 def start_by(experiment: Experiment) -> list[tuple[int, np.ndarray]]:
     """Derivatives of the initial velocities: (parameter, (b,))."""
     layout, _, _ = experiment
-    additions = [(term.coefficient, term.addition) for term in layout.terms if term.addition.effect.changes_start]
-    v0 = stated_start(experiment)[0] if additions else NOTHING
-    index = layout.structure.body_index
-    return [(parameter, one.effect.start_velocity(one.target, index, v0)) for parameter, one in additions]
+    index, found = layout.structure.body_index, []
+    for term in (term for term in layout.terms if term.addition.effect.changes_start):
+        faster = term.addition.effect.start_velocity(term.addition.target, index, stated_start(experiment)[0])
+        found.append((term.coefficient, faster))
+    return found
 
 
 def stated_start(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:

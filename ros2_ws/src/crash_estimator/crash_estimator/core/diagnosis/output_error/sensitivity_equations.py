@@ -33,8 +33,8 @@ def _whole(columns):
 def propagate(system, sampling, out):
     """Fill out (bins, q, columns); system: a `linear.Linear`, sampling: a `linear.Sampling`."""
     steps, ends, crush_ends, inverse_mass, kind, kx, kv, kp, loading, knot, weight = system[:11]
-    changed, start, observer, others, column, body, acts, remembers, kept, by_crush, by_before = system[11:22]
-    recalled, touched = system[22:24]
+    changed, start, observer, others, column, body, acts, remembers, kept, by_crush, by_before, recalled = system[11:23]
+    touched = system[23]
     b, links, columns = len(kind), len(ends), _whole(others + touched[-1])
     x, v, a = np.zeros((b, columns)), np.zeros((b, columns)), np.zeros((b, columns))
     peak, row = np.zeros((links, columns)), np.zeros((b, columns))
@@ -46,8 +46,7 @@ def propagate(system, sampling, out):
             number[k] = free
             free += 1
         measured |= kind[k] == FIXED and inverse_mass[k] > 0.0
-        for j in range(others):
-            v[k, j] = start[k, j]
+    v[:, :others] = start
     matrix, inverse = np.zeros((free, free)), np.zeros((free, free))
     first, second = 2.0 * observer, observer**2
     for t in range(len(steps)):
@@ -167,8 +166,7 @@ def respond(system, change):
     One column needs no loops over columns, and so a fourth of the time.
     """
     steps, ends, crush_ends, inverse_mass, kind, kx, kv, kp, loading, knot, weight = system[:11]
-    changed, start, observer, others, column, body, acts, remembers, kept, by_crush, by_before = system[11:22]
-    recalled = system[22]
+    changed, start, observer, others, column, body, acts, remembers, kept, by_crush, by_before, recalled = system[11:23]
     b, links = len(kind), len(ends)
     x, v, a, row, peak = np.zeros(b), np.zeros(b), np.zeros(b), np.zeros(b), np.zeros(links)
     memory = np.zeros(len(remembers))
@@ -177,8 +175,7 @@ def respond(system, change):
         if kind[k] == FREE:
             number[k] = free
             free += 1
-        for j in range(others):
-            v[k] += change[j] * start[k, j]
+        v[k] = (start[k] * change[:others]).sum()
     matrix, inverse = np.zeros((free, free)), np.zeros((free, free))
     first, second = 2.0 * observer, observer**2
     rows, found = np.zeros((len(steps), b)), np.zeros((len(steps), b))
