@@ -260,5 +260,5 @@ def test_a_time_zero_counts_as_what_was_added_where_no_effect_was(monkeypatch, e
     monkeypatch.setattr(report, "verdict_on", judged)
     zero = SimpleNamespace(as_stated=models[0]) if time_zero else None
     with pytest.raises(Judged):
-        report._answer(None, path, SimpleNamespace(stated=False), zero)
+        report._answer(SimpleNamespace(place_of=str), path, SimpleNamespace(stated=False), zero)
     assert asked == [counted]

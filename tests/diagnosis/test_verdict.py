@@ -114,7 +114,7 @@ def test_evidence_is_weighed_in_noise_as_large_as_what_is_left_or_where_next_to_
 
     monkeypatch.setattr(report, "verdict_on", asked)
     with pytest.raises(Asked) as found:
-        report._answer(None, path, DEFAULT, None)
+        report._answer(SimpleNamespace(place_of=str), path, DEFAULT, None)
     (evidence,) = found.value.args
     assert evidence.weighed == weighed
 

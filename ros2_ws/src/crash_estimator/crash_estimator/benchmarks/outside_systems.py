@@ -1,12 +1,14 @@
-"""Other people's systems for `outside`: a free body that a measured force pushes, observed by its displacement."""
+"""Other people's systems for `outside`: free bodies that a measured force pushes; one of them carries no sensor."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from scipy.io import loadmat
 
+from crash_replay.gravity import G
 from crash_replay.recording import Channel, Recording, Test
 
 from ..core.diagnosis import EFFECT_MISSING, Diagnosis, predict
@@ -47,6 +49,20 @@ RUNG_OUT = 0.2
 LARGEST_ERROR = 1.1e-3
 """V, of that simulation: with y^2 and y^3 the benchmark's own authors reach 1.05 mV."""
 
+NOSE, BODY = 0.0673, 0.5228  # kg
+IMPACTOR = Structure(
+    "impactor",
+    (Body("nose", mass=NOSE, applied="water_fx"), Body("body", mass=BODY, acceleration=("body_ax",))),
+    (Element("mount", ("nose", "body"), Coefficient(0.0), DAMPER),),
+)
+"""Two bodies that fall on water. The nose has no sensor, and the force on it is that on the same bodies without a
+spring between them, (NOSE + BODY) a, mean of six repeats."""
+MOUNTS, WITHIN_OF_SPRING = {"SF60100": 8160.0, "SS60100": 1740.0}, 0.1
+"""N/m of the spring by file (TwoBodyConeImpactData, Boom et al. 2025), and the share of it that counts as right. Least
+squares of the same two equations with a damper finds 5300 and 1020 N/m, with the nose's mass free 5580 and 1300."""
+FELL, UNTIL = -0.05, 0.06
+"""s about the impact that are taken: after them the impactor is under water."""
+
 
 def other_systems(folder: Path) -> Iterator:
     """Of what the folder has."""
@@ -61,25 +77,53 @@ def other_systems(folder: Path) -> Iterator:
             f"a cubic stiffness; free run of another burst within {1e3 * LARGEST_ERROR:g} mV",
             lambda found: _is_cubic(found, tested), lambda found: f"{1e3 * free_run_error(found, tested):.2g} mV",
         )  # fmt: skip
+    rigid = folder / "cone" / "SR60100.mat"
+    for name, spring in MOUNTS.items():
+        sprung = rigid.with_name(f"{name}.mat")
+        for repeats in ((1,), (1, 2)) if rigid.exists() and sprung.exists() else ():
+            yield Case(
+                f"two bodies dropped on water, {name}, " + " and ".join(map(str, repeats)),
+                partial(_drops, rigid, sprung, repeats), IMPACTOR,
+                f"a spring of {spring:g} N/m", partial(_is_spring, spring=spring),
+            )  # fmt: skip
 
 
 def _axis(path: Path) -> Recording:
     data = loadmat(path)
     time = data["t"].ravel() - data["t"].ravel()[0]
     force = data["gtau"].item() * data["vir"].ravel()
-    return _recording("emps", time, ("axis_x", data["qm"].ravel()), ("motor_fx", force))
+    x = Channel("axis_x", "displacement"), data["qm"].ravel()
+    return _recording("emps", time, x, (Channel("motor_fx", "force"), force))
 
 
 def _oscillator(path: Path, samples: slice) -> Recording:
     drive, shown = np.genfromtxt(path, delimiter=",", skip_header=1, usecols=(0, 1))[samples].T
-    return _recording("silverbox", np.arange(len(shown)) / SAMPLING, ("mass_x", shown), ("drive_fx", drive))
+    return _recording(
+        "silverbox", np.arange(len(shown)) / SAMPLING,
+        (Channel("mass_x", "displacement"), shown), (Channel("drive_fx", "force"), drive),
+    )  # fmt: skip
 
 
-def _recording(name: str, time: np.ndarray, motion: tuple, force: tuple) -> Recording:
-    channels = Channel(motion[0], "displacement"), Channel(force[0], "force")
-    return Recording(
-        Test(name, channels), np.rint(time * 1e9).astype(np.int64), np.stack([motion[1], force[1]], axis=1)
-    )
+def _drops(rigid: Path, sprung: Path, repeats: tuple[int, ...]) -> list[Recording]:
+    return [_dropped(rigid, sprung, repeat) for repeat in repeats]
+
+
+def _dropped(rigid: Path, sprung: Path, repeat: int) -> Recording:
+    """m/s^2 and N in the direction of the fall, of an accelerometer that shows 0 while it falls."""
+    time, felt = loadmat(sprung)[f"{sprung.stem}{repeat}"][:, :2].T
+    taken = (time > FELL) & (time < UNTIL)
+    time, felt = time[taken], felt[taken]
+    repeats = [values[:, :2].T for name, values in loadmat(rigid).items() if name.startswith(rigid.stem)]
+    force = -(NOSE + BODY) * G * np.mean([np.interp(time, *each) for each in repeats], axis=0)
+    return _recording(
+        f"{sprung.stem}{repeat}", time,
+        (Channel("body_ax", "acceleration"), -G * felt), (Channel("water_fx", "force"), force),
+    )  # fmt: skip
+
+
+def _recording(name: str, time: np.ndarray, *measured: tuple[Channel, np.ndarray]) -> Recording:
+    channels, values = zip(*measured, strict=True)
+    return Recording(Test(name, channels), np.rint(time * 1e9).astype(np.int64), np.stack(values, axis=1))
 
 
 def _is_friction(found: Diagnosis) -> bool:
@@ -87,6 +131,13 @@ def _is_friction(found: Diagnosis) -> bool:
         return False
     first = found.steps[0]
     return first.effect == "coulomb_friction" and abs(first.coefficient / FRICTION - 1.0) < WITHIN_OF_FRICTION
+
+
+def _is_spring(found: Diagnosis, spring: float) -> bool:
+    if found.verdict != EFFECT_MISSING or not found.steps:
+        return False
+    first = found.steps[0]
+    return first.effect == "load_path" and abs(first.coefficient / spring - 1.0) < WITHIN_OF_SPRING
 
 
 def _is_cubic(found: Diagnosis, tested: Recording) -> bool:

@@ -1,4 +1,5 @@
-"""Accelerations of bodies that are observed by their displacement or velocity alone, found from the whole recording.
+"""Accelerations of bodies that are observed by their displacement or velocity alone, found from the whole recording,
+and of those that nothing observes, by the momentum.
 
 The derivative is that of a local polynomial (Savitzky and Golay 1964), over the longest window that still follows the
 channel to within its noise. It looks ahead: nothing here serves a node that follows sample by sample.
@@ -13,6 +14,7 @@ import numpy as np
 from crash_replay.recording import Channel, Recording
 
 from .differences import by_differences
+from .momentum import acceleration_by_momentum
 from .structure import Body, ModelError, Structure
 
 ORDER = 4
@@ -34,24 +36,34 @@ class Smoothed(NamedTuple):
 def with_accelerations(
     structure: Structure, recordings: Sequence[Recording]
 ) -> tuple[Structure, tuple[Recording, ...]]:
-    """The same where every free body has an acceleration channel: a derived one where it is observed otherwise.
+    """The same where every free body has an acceleration channel: a derived one where it is observed otherwise, or not
+    at all.
 
-    Where a test does not say how such a body starts, its own channel says it.
+    Where a test does not say how a body starts that is observed by its displacement or velocity, that channel says it.
     """
-    bodies = [body for body in structure.bodies if body.free and not body.acceleration and body.motion_channel]
-    if not bodies:
+    names = {
+        body.name: f"{body.motion_channel or body.name}_derived_acceleration"
+        for body in structure.bodies if body.free and not body.acceleration
+    }  # fmt: skip
+    if not names:
         return structure, tuple(recordings)
-    names = {body.name: f"{body.motion_channel}_derived_acceleration" for body in bodies}
     derived = [
         replace(body, acceleration=(names[body.name],), derived=True) if body.name in names else body
         for body in structure.bodies
     ]
+    observed = [body for body in derived if body.name in names and body.motion_channel]
+    unobserved = [body for body in derived if not body.is_measured and body.name in names]
+    structure = replace(structure, bodies=tuple(derived))
     found = []
     for recording in recordings:
-        for body in bodies:
+        for body in observed:
             recording = _with_acceleration(recording, body, names[body.name])
+        for body in unobserved:
+            values = acceleration_by_momentum(structure, body.name, recording)
+            channel = Channel(names[body.name], "acceleration", body.name, source="derived from the momentum")
+            recording = _with_channel(recording, channel, values)
         found.append(recording)
-    return replace(structure, bodies=tuple(derived)), tuple(found)
+    return structure, tuple(found)
 
 
 def _with_acceleration(recording: Recording, body: Body, name: str) -> Recording:
@@ -68,15 +80,16 @@ def _with_acceleration(recording: Recording, body: Body, name: str) -> Recording
     displacement = {body.name: float(found.value[start])} if body.displacement else {}
     test = replace(
         test,
-        channels=(
-            *test.channels,
-            Channel(name, "acceleration", body.name, source=f"derived from {body.motion_channel}"),
-        ),
         initial_velocity={body.name: float(velocity[start])} | dict(test.initial_velocity),
         initial_displacement=displacement | dict(test.initial_displacement),
     )
-    acceleration = np.where(valid, acceleration, np.nan)
-    return replace(recording, test=test, values=np.column_stack([recording.values, acceleration]))
+    channel = Channel(name, "acceleration", body.name, source=f"derived from {body.motion_channel}")
+    return _with_channel(replace(recording, test=test), channel, np.where(valid, acceleration, np.nan))
+
+
+def _with_channel(recording: Recording, channel: Channel, values: np.ndarray) -> Recording:
+    test = replace(recording.test, channels=(*recording.test.channels, channel))
+    return replace(recording, test=test, values=np.column_stack([recording.values, values]))
 
 
 def smoothed(values: np.ndarray, period: float) -> Smoothed:

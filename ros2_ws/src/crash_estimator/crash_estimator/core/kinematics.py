@@ -236,8 +236,9 @@ class Kinematics:
 def _check_accelerations(structure: Structure) -> None:
     for body in structure.bodies:
         if body.free and not body.acceleration:
+            by = f"is observed by {body.motion_channel} alone" if body.motion_channel else "has no sensor"
             raise ModelError(
-                f"body {body.name} of model {structure.name} is observed by {body.motion_channel} alone: sample by "
+                f"body {body.name} of model {structure.name} {by}: sample by "
                 "sample an acceleration channel is needed (`diagnose`, `estimate`, `simulate` and `report` derive it "
                 "from the whole recording)"
             )

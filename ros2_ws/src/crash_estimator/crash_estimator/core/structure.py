@@ -20,6 +20,7 @@ import numpy as np
 
 from crash_replay.recording import Test
 
+from .momentum import lacking_for_momentum
 from .structure_parts import NOTHING, Action, Body, Coefficient, EffectSpec, Element, ModelError, Parameter, Term
 
 __all__ = ["Action", "Body", "Coefficient", "EffectSpec", "Element", "ModelError", "Parameter", "Structure", "Term"]
@@ -68,8 +69,14 @@ class Structure:
         place = "bodies", body.name
         if body.free and not (body.mass and body.mass > 0):
             self._at_fault(f"body {body.name} is free and needs a mass > 0 kg", *place)
-        if not body.fixed and not (body.acceleration or body.motion_channel):
+        if body.driven and not body.acceleration:
             self._at_fault(f"body {body.name} names no channel for its motion", *place)
+        if body.free and not body.is_measured:
+            lacks = lacking_for_momentum(self, body.name)
+            if lacks:
+                self._at_fault(
+                    f"body {body.name} names no channel for its motion, and momentum does not say it: {lacks}", *place
+                )
         if len(set(body.acceleration)) < len(body.acceleration):
             key = "motion" if body.driven else "acceleration"
             self._at_fault(f"body {body.name} names a channel twice: {', '.join(body.acceleration)}", *place, key)
@@ -89,7 +96,7 @@ class Structure:
     @cached_property
     def equations(self) -> tuple[int, ...]:
         """Indices of the bodies that give an equation: free with a channel, or fixed with a measured force."""
-        return tuple(k for k, b in enumerate(self.bodies) if b.free or (b.fixed and b.force))
+        return tuple(k for k, b in enumerate(self.bodies) if (b.free and b.is_measured) or (b.fixed and b.force))
 
     @cached_property
     def equation_units(self) -> tuple[str, ...]:
@@ -157,10 +164,13 @@ class Structure:
 
     def is_held(self, body: int) -> bool:
         """Whether a spring brings the body back."""
-        return any(
-            body in ends and (element.stiffness.estimated or element.stiffness.value or element.terms)
-            for element, ends in zip(self.elements, self.ends)
-        )
+        return any(body in ends and element.has_spring for element, ends in zip(self.elements, self.ends))
+
+    def place_of(self, target: str) -> frozenset[str]:
+        """The bodies that an effect's target joins, an element or "body_a-body_b"; of any other, the target itself."""
+        between = {e.name: e.between for e in self.elements}
+        between |= {f"{a.name}-{b.name}": (a.name, b.name) for a in self.bodies for b in self.bodies if a is not b}
+        return frozenset(between.get(target, (target,)))
 
     def reduced_mass(self, element: int) -> float:
         """Of the two bodies of an element; a driven or fixed one is infinitely heavy, a carried one its carrier."""

@@ -48,6 +48,16 @@ class Body:
         """What it is observed by beside its acceleration."""
         return self.displacement or self.velocity
 
+    @property
+    def is_measured(self) -> bool:
+        """Whether a channel of the test shows how it moves; where none does, momentum says it (`momentum`)."""
+        return bool(self.motion_channel or (self.acceleration and not self.derived))
+
+    @property
+    def starts_as_observed(self) -> bool:
+        """Whether its own displacement or velocity says how it starts."""
+        return self.derived and bool(self.motion_channel)
+
 
 @dataclass(frozen=True)
 class Coefficient:
@@ -103,6 +113,10 @@ class Element:
     origin: float = 0.0  # m: the crush counts from here, as beyond a gap
     play: float = 0.0  # m: to either side it carries nothing, and its crush counts from there
     factor: Callable[[np.ndarray], np.ndarray] | None = None  # of the rates (n,) m/s: what multiplies the static force
+
+    @property
+    def has_spring(self) -> bool:
+        return bool(self.stiffness.estimated or self.stiffness.value or self.terms)
 
     @property
     def unloads(self) -> bool:

@@ -1,4 +1,4 @@
-"""A load path: a linear spring between two bodies that the model does not join, F = c X, both ways.
+"""A load path: a linear spring between two bodies that no spring of the model joins, F = c X, both ways.
 
 X = x_a - x_b in m, counted from their distance at time zero; c in N/m, never negative. Form `late`: a part that is
 reached on the way, F = c (X - gap) where that is positive; `late_back`: where b runs into a from behind.

@@ -267,6 +267,6 @@ def _kicks(b: Builder, structure: Structure, measured: Trajectory) -> dict[int, 
     """Errors of the velocities that bodies start with, where these are derivatives at the very end of a channel."""
     found = {}
     for k, body in enumerate(structure.bodies):
-        if body.derived:
+        if body.starts_as_observed:
             found[k] = b.add("kick", 0.0, START_ERRS * float(np.std(measured.v[:, k])))
     return found

@@ -128,7 +128,7 @@ def measure_magnitudes(
     body_force = np.full(len(structure.bodies), np.inf)
     for k, body in enumerate(structure.bodies):
         rows = [q for q, output in enumerate(outputs) if output.body == k]
-        if body.motion_channel:
+        if body.motion_channel or body.derived:
             body_force[k] = body.mass * max(float(np.abs(motion.a[:, k]).max()) for motion in measured)
         elif rows:
             inertia = body.mass if body.free else 1.0

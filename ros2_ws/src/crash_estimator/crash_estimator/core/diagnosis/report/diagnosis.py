@@ -204,7 +204,9 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
     certain = all(abs(one.coefficient) > one.std for one in reports)
     many = len(added) or len(reports)  # a time zero is none of the effects that may be too many
     needed = needed_share(added)
-    evidence = Evidence(many, final.white, drift, before, after, ranking, weighed, certain, by_first, needed)
+    evidence = Evidence(
+        many, final.white, drift, before, after, ranking, weighed, certain, by_first, needed, structure.place_of
+    )
     verdict = verdict_on(evidence, tolerance)
     if added and verdict.word == ADEQUATE:
         return _answer(structure, up_to(path, 0), tolerance, None)

@@ -1,6 +1,6 @@
 """The verdict in two grades: whether something is named, and whether what is left then is complete."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import NamedTuple
 
 from ..residuals.score_test import Drift
@@ -25,6 +25,7 @@ class Evidence(NamedTuple):
     certain: bool  # every coefficient that was added is beyond its standard deviation
     by_first: float = 0.0  # share of the misfit in the band that the first effect explains, wherever it is missing
     needed: float = THRESHOLDS.named_share  # share that all of them must explain
+    place_of: Callable[[str], Hashable] = str  # what two targets have in common that are the same place
 
     @property
     def noise(self) -> bool:
@@ -47,7 +48,7 @@ def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
         word = EFFECT_MISSING if evidence.added else ADEQUATE
         return Verdict(word if evidence.added <= THRESHOLDS.most_at_once else UNEXPLAINED, True)
     within = tolerance.admits(evidence.after)
-    if _explains(evidence) and _stands_still(evidence) and (within or _beats_its_rivals(evidence.ranking)):
+    if _explains(evidence) and _stands_still(evidence) and (within or _beats_its_rivals(evidence)):
         return Verdict(EFFECT_MISSING, within)
     nothing_to_add = not (evidence.added or evidence.white) and _stands_still(evidence)
     little = tolerance.admits(evidence.before) and (nothing_to_add or evidence.before.is_less_than_noise)
@@ -73,9 +74,10 @@ def _explains(evidence: Evidence) -> bool:
     )
 
 
-def _beats_its_rivals(ranking: Sequence[Ranked]) -> bool:
+def _beats_its_rivals(evidence: Evidence) -> bool:
     """The first candidate does, by evidence, all that were fitted but the same effect elsewhere and other laws of the
-    same target: what is missing is sure then, or where; these rivals are named."""
-    first, *others = ranking
-    unlike = [r.evidence for r in others if r.fitted and r.effect != first.effect and r.target != first.target]
+    same place: what is missing is sure then, or where; these rivals are named."""
+    (first, *others), place_of = evidence.ranking, evidence.place_of
+    elsewhere = [r for r in others if place_of(r.target) != place_of(first.target)]
+    unlike = [r.evidence for r in elsewhere if r.fitted and r.effect != first.effect]
     return first.evidence > max(unlike, default=0.0) + THRESHOLDS.confounded

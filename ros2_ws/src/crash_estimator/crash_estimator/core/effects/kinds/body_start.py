@@ -22,7 +22,7 @@ class BodyStart(Effect):
     changes_start: ClassVar[bool] = True
 
     def possible_targets(self, structure, test):
-        return [body.name for body in structure.bodies if not (body.fixed or body.derived)]
+        return [body.name for body in structure.bodies if not (body.fixed or body.starts_as_observed)]
 
     def put_to_work(self, structure, test, spec):
         if spec.coefficient is None:
@@ -43,6 +43,7 @@ class BodyStart(Effect):
         seen = np.zeros(len(structure.bodies), bool)
         for k, name in enumerate(structure.body_index):
             group = self.start_velocity(name, structure.body_index, magnitudes.records[0].initial_velocity) != 0.0
-            if group[k] and not seen[k] and not any(structure.bodies[j].derived for j in np.flatnonzero(group)):
+            observed = any(structure.bodies[j].starts_as_observed for j in np.flatnonzero(group))
+            if group[k] and not seen[k] and not observed:
                 yield Addition(self, name)
             seen |= group

@@ -1,4 +1,4 @@
-"""A spring of its own between two bodies that no element joins."""
+"""A spring of its own between two bodies that no spring joins."""
 
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations
@@ -15,7 +15,7 @@ from .element_force import HALF
 
 @dataclass(frozen=True)
 class PairSpring(Effect):
-    """An element of its own between two bodies that are not joined: F = c X.
+    """An element of its own between two bodies that no spring of the model joins: F = c X.
 
     Its variants: it carries both ways, its crush counted from time zero (""), or from where its bodies' displacements
     agree (absolute); or compression only, with the second body before the first (one_way), or behind (one_way_back);
@@ -54,7 +54,7 @@ class PairSpring(Effect):
     def candidates(self, structure, magnitudes):
         """Both ways, counted from time zero or not, and one way where the bodies come close enough to touch, at once or
         later."""
-        joined = {frozenset(element.between) for element in structure.elements}
+        joined = {frozenset(element.between) for element in structure.elements if element.has_spring}
         starts = [record.initial_displacement for record in magnitudes.records]
         for (i, a), (k, b) in combinations(enumerate(structure.bodies), 2):
             if frozenset((a.name, b.name)) in joined or not (a.free or b.free):

@@ -1,0 +1,142 @@
+"""A free body that carries no sensor moves as its momentum says: an engine behind a barrier that feels all force.
+
+Cab and engine hit the barrier; the truth is simulated here by scipy's integrator.
+"""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+from crash_estimator.core.derived_motion import with_accelerations
+from crash_estimator.core.diagnosis import diagnose
+from crash_estimator.core.fold import run
+from crash_estimator.core.free_run import free_run
+from crash_estimator.core.kinematics import Kinematics
+from crash_estimator.core.methods import make_estimator
+from crash_estimator.core.structure import ModelError
+from crash_estimator.model_file import load_model
+from crash_replay.recording import Channel, Recording, Test
+
+CAR = """
+name: car
+bodies:
+  cab: {mass: 900.0, acceleration: cab_ax}
+  engine: {mass: 300.0}
+  barrier: {fixed: true, force: barrier_fx}
+elements:
+  front:
+    between: [engine, barrier]
+    tension: none
+    stiffness: {estimate: true, initial: 5.0e5, shape: constant}
+    damping: 4000.0
+  mount:
+    between: [cab, engine]
+    stiffness: {estimate: true, initial: 5.0e5, shape: constant}
+"""
+CAB, ENGINE, SPEED = 900.0, 300.0, 12.0
+FRONT, FRONT_DAMPING, MOUNT, MOUNT_DAMPING = 8.0e5, 4000.0, 1.2e6, 9000.0
+
+
+def crashed(mount_damping: float, seed: int) -> Recording:
+    """120 ms at 10 kHz from 30 ms before the impact: 0.3 g of noise on the cab, 1 kN on the barrier."""
+
+    def forces(x_cab, x_engine, v_cab, v_engine):
+        front = np.where(x_engine > 0.0, np.maximum(FRONT * x_engine + FRONT_DAMPING * v_engine, 0.0), 0.0)
+        return front, MOUNT * (x_cab - x_engine) + mount_damping * (v_cab - v_engine)
+
+    def slope(t, state):
+        front, mount = forces(*state)
+        return state[2], state[3], -mount / CAB, (mount - front) / ENGINE
+
+    time = np.arange(0.0, 0.12, 1e-4)
+    state = solve_ivp(slope, (0.0, time[-1]), (0.0, 0.0, SPEED, SPEED), "LSODA", time, rtol=1e-9, atol=1e-10).y
+    front, mount = forces(*state)
+    rest = np.zeros((300, 2))
+    true = np.concatenate([rest, np.stack([-mount / CAB, front], axis=1)])
+    noise = np.random.default_rng(seed).normal(0.0, 1.0, true.shape) * [0.3 * 9.80665, 1000.0]
+    channels = Channel("cab_ax", "acceleration", "cab"), Channel("barrier_fx", "force", "barrier")
+    test = Test("car", channels, initial_velocity={"cab": SPEED, "engine": SPEED})
+    time_ns = np.rint(np.arange(-300, len(time)) * 1e5).astype(np.int64)
+    return Recording(test, time_ns, true + noise)
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("models")
+
+    def made(text: str):
+        path = folder / f"{abs(hash(text))}.yaml"
+        path.write_text(text)
+        return load_model(path)
+
+    return made
+
+
+def test_momentum_says_how_it_moves(model):
+    structure, (record,) = with_accelerations(model(CAR), [crashed(0.0, 1)])
+    engine = structure.bodies[structure.body_index["engine"]]
+    assert engine.acceleration == ("engine_derived_acceleration",) and engine.derived
+    external = ENGINE * record.column("engine_derived_acceleration") + CAB * record.column("cab_ax")
+    at_rest = record.time < 0.0
+    expected = -record.column("barrier_fx") + CAB * record.column("cab_ax")[at_rest].mean()
+    assert_allclose(external, expected + record.column("barrier_fx")[at_rest].mean(), atol=1e-6)
+
+
+def test_it_gives_no_equation_of_its_own(model):
+    structure, _ = with_accelerations(model(CAR), [crashed(0.0, 1)])
+    assert [structure.bodies[k].name for k in structure.equations] == ["cab", "barrier"]
+
+
+@pytest.mark.parametrize("method", ["mrls", "constrained_kalman"])
+def test_estimators_find_the_stiffness_behind_it(model, method):
+    structure, (record,) = with_accelerations(model(CAR), [crashed(0.0, 2)])
+    estimator = make_estimator(structure, record.test, method)
+    estimates = run(estimator, record.samples())
+    found = dict(zip(estimator.description.parameters, estimates[-1].parameters, strict=True))
+    assert found["mount.stiffness"] == pytest.approx(MOUNT, rel=0.05)
+    simulated = free_run(structure, estimator.description, estimates, recording=record)
+    errors = simulated.measured[:, 0] - simulated.predicted[:, 0]
+    assert np.std(errors) < 0.2 * np.std(simulated.measured[:, 0])
+
+
+def test_a_damper_that_its_mount_lacks_is_named(model):
+    found = diagnose(model(CAR), [crashed(MOUNT_DAMPING, 3), crashed(MOUNT_DAMPING, 4)])
+    assert (found.verdict, found.complete) == ("effect_missing", True), found.text
+    assert [(step.effect, step.target) for step in found.steps] == [("viscous_damping", "mount")]
+    assert found.steps[0].coefficient == pytest.approx(MOUNT_DAMPING, rel=0.05)
+
+
+def test_with_nothing_missing_nothing_is_named(model):
+    found = diagnose(model(CAR), [crashed(0.0, 5), crashed(0.0, 6)])
+    assert (found.verdict, found.complete) == ("adequate", True), found.text
+
+
+def test_a_spring_that_nothing_but_a_damper_stands_for_is_named(model):
+    mount = CAR.index("    between: [cab, engine]")
+    damper = "    between: [cab, engine]\n    stiffness: 0.0\n    damping: {estimate: true, initial: 9.0}\n"
+    found = diagnose(model(CAR[:mount] + damper), [crashed(MOUNT_DAMPING, 7), crashed(MOUNT_DAMPING, 8)])
+    assert found.verdict == "effect_missing", found.text
+    assert (found.steps[0].effect, found.steps[0].target) == ("load_path", "cab-engine")
+    assert found.steps[0].coefficient == pytest.approx(MOUNT, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    "changed, lacks",
+    [
+        (("force: barrier_fx", ""), r"the force on barrier is not measured \(`force: CHANNEL`\)"),
+        ((", acceleration: cab_ax", ""), "engine has none either"),
+        (("between: [engine, barrier]", "between: [cab, barrier]"), "no element leads to it"),
+    ],
+)
+def test_what_momentum_lacks_is_said(model, changed, lacks):
+    text = CAR.replace(*changed)
+    if "no element" in lacks:
+        text = text.replace("[cab, engine]", "[cab, barrier]")
+    with pytest.raises(ModelError, match="names no channel for its motion, and momentum does not say it: .*" + lacks):
+        model(text)
+
+
+def test_sample_by_sample_it_is_refused(model):
+    with pytest.raises(ModelError, match="body engine of model car has no sensor.*acceleration channel is needed"):
+        Kinematics(model(CAR), crashed(0.0, 1).test)
