@@ -16,6 +16,7 @@ from crash_estimator.core.kinematics import Kinematics
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.core.structure import ModelError
 from crash_estimator.model_file import load_model
+from crash_estimator.report_page import write_report
 from crash_replay.recording import Channel, Recording, Test
 
 CAR = """
@@ -38,7 +39,7 @@ CAB, ENGINE, SPEED = 900.0, 300.0, 12.0
 FRONT, FRONT_DAMPING, MOUNT, MOUNT_DAMPING = 8.0e5, 4000.0, 1.2e6, 9000.0
 
 
-def crashed(mount_damping: float, seed: int) -> Recording:
+def crashed(mount_damping: float, seed: int, push: float = 0.0) -> Recording:
     """120 ms at 10 kHz from 30 ms before the impact: 0.3 g of noise on the cab, 1 kN on the barrier."""
 
     def forces(x_cab, x_engine, v_cab, v_engine):
@@ -47,13 +48,13 @@ def crashed(mount_damping: float, seed: int) -> Recording:
 
     def slope(t, state):
         front, mount = forces(*state)
-        return state[2], state[3], -mount / CAB, (mount - front) / ENGINE
+        return state[2], state[3], (push - mount) / CAB, (mount - front) / ENGINE
 
     time = np.arange(0.0, 0.12, 1e-4)
     state = solve_ivp(slope, (0.0, time[-1]), (0.0, 0.0, SPEED, SPEED), "LSODA", time, rtol=1e-9, atol=1e-10).y
     front, mount = forces(*state)
     rest = np.zeros((300, 2))
-    true = np.concatenate([rest, np.stack([-mount / CAB, front], axis=1)])
+    true = np.concatenate([rest, np.stack([(push - mount) / CAB, front], axis=1)])
     noise = np.random.default_rng(seed).normal(0.0, 1.0, true.shape) * [0.3 * 9.80665, 1000.0]
     channels = Channel("cab_ax", "acceleration", "cab"), Channel("barrier_fx", "force", "barrier")
     test = Test("car", channels, initial_velocity={"cab": SPEED, "engine": SPEED})
@@ -98,6 +99,25 @@ def test_estimators_find_the_stiffness_behind_it(model, method):
     simulated = free_run(structure, estimator.description, estimates, recording=record)
     errors = simulated.measured[:, 0] - simulated.predicted[:, 0]
     assert np.std(errors) < 0.2 * np.std(simulated.measured[:, 0])
+
+
+def test_no_masses_are_found_from_a_motion_that_they_gave(model):
+    structure, (record,) = with_accelerations(model(CAR), [crashed(0.0, 2)])
+    with pytest.raises(ModelError, match="body engine has no acceleration channel"):
+        make_estimator(structure, record.test, "effective_mass")
+
+
+def test_an_effect_whose_force_nobody_measured_is_refused(model):
+    pushed = CAR + "effects:\n  - {type: constant_force, body: cab, coefficient: 100.0}\n"
+    structure, (record,) = with_accelerations(model(pushed), [crashed(0.0, 2)])
+    with pytest.raises(ModelError, match="the force of cab.constant_force on cab is not measured"):
+        make_estimator(structure, record.test, "mrls")
+
+
+def test_a_report_says_why_it_does_not_estimate_what_was_found(model, tmp_path):
+    page = write_report(crashed(0.0, 9, push=3.0e4), model(CAR), ["mrls"], tmp_path / "page", markdown=True)
+    said = page.with_suffix(".md").read_text()
+    assert "constant_force on cab" in said and "follows is of the model as given, without what was found: " in said
 
 
 def test_a_damper_that_its_mount_lacks_is_named(model):

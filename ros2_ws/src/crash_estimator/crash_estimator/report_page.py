@@ -74,11 +74,15 @@ def write_report(  # noqa: PLR0913 - every option of the command
     runs = {best: (given, results[best])}
     if better:
         with step(f"estimates by {best} with what was found"):
-            result = estimated(better, best, settings=settings)
-        runs[f"{best} {REVISED}"] = applied(better, recording.test, effects), result
-        if result.description.equations == results[best].description.equations:
-            results[f"{best} {REVISED}"] = result
-        missing += [Paragraph(_what_is_revised(structure, better))]
+            try:
+                result = estimated(better, best, settings=settings)
+            except ModelError as error:
+                result, why = None, f"What follows is of the model as given, without what was found: {error}."
+        missing += [Paragraph(_what_is_revised(structure, better) if result else why)]
+        if result:
+            runs[f"{best} {REVISED}"] = applied(better, recording.test, effects), result
+            if result.description.equations == results[best].description.equations:
+                results[f"{best} {REVISED}"] = result
     with step("free run"):
         runs_free = _free_runs(recording, runs, end, smooth, compared)
     with step("jumps"):

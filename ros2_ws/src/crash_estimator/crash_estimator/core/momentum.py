@@ -47,7 +47,7 @@ def _lacks(structure: "Structure", name: str) -> Iterator[str]:
             continue
         for action in structure.actions:
             if action.at == k and action.kind in ("body", "inertia"):
-                yield f"{action.name} pushes {body.name}, by what is to be found"
+                yield f"the force of {action.name} on {body.name} is not measured"
         if body.free and body.name != name and not body.is_measured:
             yield f"{body.name} has none either"
         if body.driven:

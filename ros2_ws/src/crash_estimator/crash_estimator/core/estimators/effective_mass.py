@@ -104,7 +104,8 @@ class EffectiveMass:
 
     def _check(self) -> None:
         name = self.structure.name
-        silent = [self.structure.bodies[k].name for k in self.free if not self.structure.bodies[k].acceleration]
+        free = [self.structure.bodies[k] for k in self.free]
+        silent = [body.name for body in free if not (body.acceleration and body.is_measured)]
         driven = [body.name for body in self.structure.bodies if body.driven]
         if silent or driven:
             what = (
