@@ -2,7 +2,8 @@
 
     v(t) = v0 + integral of a,    x(t) = x0 + integral of v
 
-from a stated initial velocity and displacement, after removing each channel's pre-impact mean. Between
+from a stated initial velocity and displacement, after removing each channel's pre-impact mean; a measured crush counts
+from where it stands before the impact. Between
 two samples the acceleration is taken as a straight line: v += dt (a0 + a1)/2, x += v0 dt + dt^2 (2 a0 + a1)/6.
 """
 
@@ -24,6 +25,11 @@ FEWEST = 20
 
 RECORD = 0.05
 """s: over a record of this length the noise's own mean is an offset as well; it adds to the error of the zero."""
+
+
+STANDS = 0.5
+"""Of its mean, by which a measured crush may differ from that at the impact and still stand: a gap that closes evenly
+differs by all of it."""
 
 
 class Motion(NamedTuple):
@@ -58,6 +64,7 @@ class KinematicState(NamedTuple):
     acceleration: np.ndarray  # (b,) the last valid one
     crush: np.ndarray  # (e,) of the last sample
     rate: np.ndarray  # (e,)
+    zero: np.ndarray  # (e,) m, of a measured crush: where it stands before the impact
 
 
 def initial_motion(structure: Structure, test: Test) -> tuple[np.ndarray, np.ndarray]:
@@ -119,6 +126,7 @@ class Kinematics:
             bodies,
             elements,
             elements,
+            elements,
         )
 
     def step(self, state: KinematicState, sample: Sample) -> tuple[KinematicState, Motion]:
@@ -141,6 +149,8 @@ class Kinematics:
             last = now if state.time_ns < 0 else state.acceleration
             displacement = state.displacement + dt * state.velocity + dt * dt * (2.0 * last + now) / 6.0
             velocity = state.velocity + 0.5 * dt * (last + now)
+        if before_impact:
+            state = state._replace(zero=self._zeros(state, values))
         crush, rate = self._crush(state, values, displacement, velocity, dt)
         measured = self._measured(values, acceleration)
         applied = self._applied(values)
@@ -178,7 +188,7 @@ class Kinematics:
         crush = displacement[ends[:, 0]] - displacement[ends[:, 1]] - self.origin
         rate = velocity[ends[:, 0]] - velocity[ends[:, 1]]
         for element, column in self.crush_channels:
-            measured = values[column] - self.origin[element]
+            measured = values[column] - state.zero[element] - self.origin[element]
             crush[element] = measured if measured == measured else state.crush[element]
         for element in self.derived_rates:
             slope = (crush[element] - state.crush[element]) / dt if dt > 0 else 0.0
@@ -186,6 +196,14 @@ class Kinematics:
         for element, column in self.rate_channels:
             rate[element] = values[column] if values[column] == values[column] else state.rate[element]
         return beyond(self.play, crush, rate) if self.play.any() else (crush, rate)
+
+    def _zeros(self, state: KinematicState, values: np.ndarray) -> np.ndarray:
+        zero = state.zero.copy()
+        for element, column in self.crush_channels:
+            tension = self.structure.elements[element].tension
+            if values[column] == values[column]:
+                zero[element] = zero_crush(state.offset[column], values[column], tension)
+        return zero
 
     def _measured(self, values: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
         measured = np.empty(len(self.structure.equations))
@@ -231,6 +249,14 @@ class Kinematics:
         for row, _ in self.force_channels:
             zero[self.structure.equations[row]] = noise[row] / count
         return noise, each * (1.0 / count + dt / RECORD), np.array([each, zero])
+
+
+def zero_crush(mean: float, last: float, tension: bool) -> float:
+    """m to be taken off a measured crush, of which the mean and the last value before the impact are known: where it
+    stands, for what carried there would push. What carries no tension may stand apart, and what moves does not stand.
+    """
+    stands = abs(last - mean) <= STANDS * abs(mean)
+    return mean if stands and (tension or mean > 0.0) else 0.0
 
 
 def _check_accelerations(structure: Structure) -> None:

@@ -51,6 +51,7 @@ STATE: Shapes = {
     "acceleration": ("bodies",),
     "crush": ("elements",),
     "rate": ("elements",),
+    "zero": ("elements",),  # of a measured crush
     "peak": ("elements",),
     "peak_rate": ("elements",),
     "contact": ("elements",),  # ElementState

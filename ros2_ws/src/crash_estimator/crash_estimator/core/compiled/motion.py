@@ -5,7 +5,7 @@ from numba import njit
 
 from ..contact import REVERSAL
 from ..estimate import ElementState
-from ..kinematics import FEWEST, RATE_SMOOTHING
+from ..kinematics import FEWEST, RATE_SMOOTHING, STANDS
 from ..regression import QUIETEST, SHORTEST_CRUSH
 from ..regressor_errors import HIDDEN
 
@@ -61,7 +61,11 @@ def move(plan, s, row, time_ns, raw, w):
         rate = row.velocity[a] - row.velocity[b]
         column = plan.crush_channel[k]
         if column >= 0:
-            crush = values[column] if values[column] == values[column] else s.crush[k]
+            if before and values[column] == values[column]:
+                mean = s.offset[column]
+                stands = abs(values[column] - mean) <= STANDS * abs(mean)
+                s.zero[k] = mean if stands and (mean > 0.0 or not plan.compression_only[k]) else 0.0
+            crush = values[column] - s.zero[k] if values[column] == values[column] else s.crush[k]
             if plan.rate_channel[k] < 0:
                 slope = (crush - s.crush[k]) / dt if dt > 0.0 else 0.0
                 rate = s.rate[k] + (slope - s.rate[k]) * dt / (dt + RATE_SMOOTHING)

@@ -14,7 +14,7 @@ from crash_replay.onset import find_onset
 from crash_replay.recording import SI_UNIT, Recording, Test
 
 from ...derived_motion import between_samples, smoothed
-from ...kinematics import Kinematics
+from ...kinematics import Kinematics, zero_crush
 from ...noise_spectrum import NoiseSpectrum
 from ...sensor_noise import sensor_noise
 from ...structure import ModelError, Structure
@@ -190,6 +190,9 @@ def observe(structure: Structure, recording: Recording) -> ObservedRecord:
     names += [c.name for c in recording.test.channels if c.quantity == "acceleration"]
     rest = _rest_ends(recording)
     signals = {name: _signal(recording, name, time, rest) for name in dict.fromkeys(names)}
+    for element in structure.elements:
+        if element.displacement:
+            signals[element.displacement] = _from_rest(signals[element.displacement], element.tension, rest)
     start = np.array([kinematics.initial_displacement, kinematics.initial_velocity])
     for k, body in enumerate(structure.bodies):
         if body.applied:
@@ -249,6 +252,12 @@ def _signal(recording: Recording, name: str, grid: np.ndarray, rest_ends: int) -
     bridged = noise.unfiltered(bridged)
     values = np.interp(grid, recording.time, bridged)
     return Signal(recording.time, bridged, values, noise, noise.std / np.sqrt(count) if count else 0.0)
+
+
+def _from_rest(crush: Signal, tension: bool, rest_ends: int) -> Signal:
+    before = crush.values[crush.time * 1e9 < rest_ends]
+    zero = zero_crush(float(before.mean()), float(before[-1]), tension) if len(before) else 0.0
+    return crush._replace(values=crush.values - zero, on_grid=crush.on_grid - zero)
 
 
 def _seen_early(spectra: Sequence[NoiseSpectrum]) -> float:
