@@ -20,8 +20,8 @@ from crash_estimator.core.structure_parts import ALL, NOTHING, SPRINGS, Action
 from crash_estimator.model_file import load_model
 
 VOCABULARY = """viscous_damping quadratic_damping coulomb_friction hysteresis maxwell_element gas_cushion
-rate_hardening cubic_stiffness clearance bottoming_out plastic_unloading load_path added_mass unmodelled_body
-constant_force guide_friction initial_velocity channel_delay channel_gain channel_offset
+rate_hardening cubic_stiffness clearance bottoming_out yielding plastic_unloading load_path added_mass
+unmodelled_body constant_force guide_friction initial_velocity channel_delay channel_gain channel_offset
 force_offset""".split()
 DAMPERS = ("viscous_damping", "quadratic_damping", "coulomb_friction")
 FORCES = [effect for effect in EFFECTS.values() if isinstance(effect, ElementForce)]
@@ -81,6 +81,8 @@ def test_forces_have_the_sizes_of_their_equations():
     assert_allclose(EFFECTS["coulomb_friction"].force(here, speed=0.1), [1.0, -1.0])
     assert_allclose(EFFECTS["cubic_stiffness"].force(here), [8e-3, 8e-3])
     assert_allclose(EFFECTS["bottoming_out"].force(motion([0.1, 0.2], [1.0, 1.0]), stop=0.15), [0.0, 0.05], atol=1e-15)
+    yields = EFFECTS["yielding"].force(motion([0.1, 0.2], [1.0, 1.0]), yield_crush=0.15)
+    assert_allclose(yields, [0.0, -0.05], atol=1e-15)
 
 
 def test_hysteresis_that_stands_still_is_as_it_was_and_follows_what_was_before():

@@ -100,6 +100,7 @@ EVERY_EFFECT = (
     EffectSpec("clearance", "foam", 0.02),
     EffectSpec("clearance", "mount", 0.005, variant="play"),
     EffectSpec("bottoming_out", "foam", 8.0e4, {"stop": 0.08}),
+    EffectSpec("yielding", "foam", 3.0e4, {"yield_crush": 0.05}),
     EffectSpec("plastic_unloading", "foam", 2.5e5),
     EffectSpec("load_path", "striker-wall", 1.0e4),
     EffectSpec("load_path", "striker-wall", 4.0e4, {"gap": 0.08}, variant="late"),
@@ -145,9 +146,10 @@ def test_the_simulation_is_that_of_an_ode_solver(recording):
 
 
 CUBIC, STOP = EffectSpec("cubic_stiffness", "foam", 2.0e6), EffectSpec("bottoming_out", "foam", 8.0e4, {"stop": 0.08})
+YIELDS = EffectSpec("yielding", "foam", 3.0e4, {"yield_crush": 0.05})
 ON_A_LINE = [
     *((effect, what) for effect in (CUBIC, STOP) for what in ("springs", "all")),
-    *((replace(effect, variant="in_curve"), what) for effect in (CUBIC, STOP) for what in ("nothing", "all")),
+    *((replace(effect, variant="in_curve"), what) for effect in (CUBIC, STOP, YIELDS) for what in ("nothing", "all")),
     (EVERY_EFFECT[3], "all"),
 ]
 """Effects on a foam that unloads along a line of its own, and what acts on where it is spent."""

@@ -64,12 +64,13 @@ def test_where_a_jump_stops_every_other_fit_the_profile_arrives(seed, noise):
 
 
 def test_a_mass_stands_as_it_was_weighed_where_a_law_does_as_well():
-    """One body, its motion alone measured: with a slope known for its pad, a body half as heavy again does as well."""
+    """One body, its motion alone measured: with a slope known for its pad, a body half as heavy again does as well, and
+    so does a pad that yields."""
     hidden, structure, recordings = drawn("impactor", 420012, 0.5)
     first, second, *_ = diagnose(structure, recordings).ranking
     assert (first.effect, first.target) == (hidden.effect, hidden.target)
     assert (second.effect, second.target) == ("added_mass", "impactor")
-    assert first.confounded_with == ("added_mass on impactor",)
+    assert first.confounded_with == ("added_mass on impactor", "yielding on padding")
 
 
 def test_a_mass_is_believed_like_any_effect_where_a_force_or_another_body_is_measured():

@@ -196,15 +196,15 @@ def test_a_run_is_resumed_where_it_was_and_writes_its_page(tmp_path, monkeypatch
     monkeypatch.setattr(effects, "TIMED", ())
     results, to = tmp_path / "results.jsonl", tmp_path / "docs" / "page.md"
     arguments = ["--seeds-from", DEVELOPMENT, "--like", "impactor/", "--processes", 1, "--results", results, "--to", to]
-    assert run(monkeypatch, "--cases", 12, *arguments) == 0
+    assert run(monkeypatch, "--cases", 4, *arguments) == 0
     kept = results.read_text()
     rows = [json.loads(line) for line in kept.splitlines()]
-    asked = [case.name for case in plan(DEVELOPMENT)[:12] if case.structure == "impactor"]
+    asked = [case.name for case in plan(DEVELOPMENT)[:4] if case.structure == "impactor"]
     assert [line["case"] for line in rows] == asked and len(asked) == 2
     assert all("verdict" in line for line in rows)
     assert "2 cases judged of 2 planned" in to.read_text()
     capsys.readouterr()
-    assert run(monkeypatch, "--cases", 12, *arguments) == 0
+    assert run(monkeypatch, "--cases", 4, *arguments) == 0
     assert results.read_text() == kept and f"2 cases, 2 of them in {results}" in capsys.readouterr().out
 
 

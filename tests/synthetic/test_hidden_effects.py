@@ -30,6 +30,7 @@ PARALLEL = {
     "coulomb_friction": lambda c, x, v, speed: c * np.tanh(v / speed),
     "cubic_stiffness": lambda c, x, v: c * x**3,
     "bottoming_out": lambda c, x, v, stop: c * np.maximum(x - stop, 0.0),
+    "yielding": lambda c, x, v, yield_crush: -c * np.maximum(x - yield_crush, 0.0),
 }
 
 

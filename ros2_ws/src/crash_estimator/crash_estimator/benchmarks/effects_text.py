@@ -29,8 +29,8 @@ search, and the structure is then drawn anew
 ([`observable.py`](../ros2_ws/src/crash_replay/crash_replay/synthetic/hidden/observable.py)):
 
 - an element hardly loaded (under 15 % of the largest peak force, or under 10 mm of crush);
-- `cubic_stiffness`, `bottoming_out` and `clearance` where the model leaves the element's curve free: such a curve
-  contains them;
+- `cubic_stiffness`, `bottoming_out`, `yielding` and `clearance` where the model leaves the element's curve free: such a
+  curve contains them; and `yielding` of an element that unloads along a line, beside which it would pull;
 - `plastic_unloading` where the element has not come down to half of its peak force;
 - the mass of the car and the gain of the barrier in `single`: M a = -F with both measured, F(X) free; in `impactor`,
   whose crush is measured, whatever only scales, shifts or delays its one equation;

@@ -93,6 +93,23 @@ class Cubic:
 
 
 @dataclass(frozen=True)
+class Limited:
+    """F = min(f(u), p): a belt's force limiter, a rail that folds at a constant force; f is monotonic, and reaches p at
+    `at`."""
+
+    under: Curve
+    p: float
+    at: float
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return (*(b for b in self.under.breaks if b < self.at), self.at)
+
+    def force(self, u: float) -> float:
+        return self.under.force(u) if u <= self.at else self.p
+
+
+@dataclass(frozen=True)
 class Folding:
     """F = f(u) (1 + a sin(2 pi u / w)): each fold of a tube, w long, gives a peak and a valley (Alexander 1960)."""
 

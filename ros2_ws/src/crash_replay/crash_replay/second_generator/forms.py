@@ -93,6 +93,10 @@ FORMS: dict[str, Form] = {
         straight=True,
     ),
     "cubic.inside": Form("cubic_stiffness", CONTACTS, sizes.inside(sizes.cubic), straight=True, lined=True),
+    "limit.flat": Form("yielding", CONTACTS, sizes.changed(sizes.limited), straight=True, elastic=True),
+    "limit.line": Form("yielding", CONTACTS, sizes.changed(sizes.limited), straight=True, lined=True),
+    "limit.knee": Form("yielding", ELEMENTS, sizes.changed(sizes.kneed), straight=True, elastic=True),
+    "limit.foam": Form("yielding", CONTACTS, sizes.changed(sizes.foamy), straight=True),
     "gap.one": Form(
         "clearance", CONTACTS, sizes.changed(lambda b: {"gap": b.share(0.08, 0.2) * b.peak.x}), straight=True
     ),

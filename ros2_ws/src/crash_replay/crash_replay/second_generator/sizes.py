@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import branches, flowing, rates, strange
-from .curves import Cubic, Curve, Folding, Progressive, Stop, Straight, Sum
+from .curves import Bilinear, Cubic, Curve, Folding, Limited, Plateau, Progressive, Stop, Straight, Sum
 from .joint import Joint
 from .machine import Body
 from .structures import Rng, Setup
@@ -76,6 +76,24 @@ def stop(base: Base, power: float = 1.0) -> Stop:
 
 def cubic(base: Base) -> Cubic:
     return Cubic(base.share(0.25, 0.5) * base.peak.f / base.peak.x**3)
+
+
+def limited(base: Base) -> dict:
+    """A straight element that gives way at a third to 0.6 of the force that it would come to."""
+    k, at = base.joint.curve.force(1.0), base.share(0.35, 0.6) * base.peak.x
+    return {"curve": Limited(base.joint.curve, k * at, at)}
+
+
+def kneed(base: Base) -> dict:
+    """Beyond the knee a tenth to a third of its stiffness is left."""
+    k, at = base.joint.curve.force(1.0), base.share(0.3, 0.5) * base.peak.x
+    return {"curve": Bilinear(k, at, base.share(0.1, 0.35) * k)}
+
+
+def foamy(base: Base) -> dict:
+    """From its stiffness smoothly to a plateau: no corner anywhere."""
+    k = base.joint.curve.force(1.0)
+    return {"curve": Plateau(k, base.share(0.4, 0.65) * base.peak.f, 0.0)}
 
 
 def cowper(base: Base) -> dict:

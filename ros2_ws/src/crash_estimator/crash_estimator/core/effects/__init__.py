@@ -22,6 +22,7 @@ from . import (
     rate_hardening,
     unmodelled_body,
     viscous_damping,
+    yielding,
 )
 from .effect import Effect
 
@@ -36,6 +37,7 @@ _FILES = (
     cubic_stiffness,
     clearance,
     bottoming_out,
+    yielding,
     plastic_unloading,
     load_path,
     added_mass,

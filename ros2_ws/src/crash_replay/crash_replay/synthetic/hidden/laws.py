@@ -113,5 +113,9 @@ def cubic_stiffness(c: float) -> Parallel:
     return lambda crush, rate: c * crush**3
 
 
+def yielding(c: float, yield_crush: float) -> Parallel:
+    return lambda crush, rate: -c * (crush - yield_crush) if crush > yield_crush else 0.0
+
+
 def bottoming_out(c: float, stop: float) -> Parallel:
     return lambda crush, rate: c * (crush - stop) if crush > stop else 0.0

@@ -3,8 +3,9 @@
 Left out, because no method could name them from what is recorded:
 
 - effects on elements that hardly carry (under 15 % of the largest peak force, or under 10 mm of crush);
-- `cubic_stiffness`, `bottoming_out`, `clearance` where the model leaves the element's curve free: such a curve contains
-  a hardening, a stop and a gap. They are hidden where the model says one constant stiffness, or a known one;
+- `cubic_stiffness`, `bottoming_out`, `yielding`, `clearance` where the model leaves the element's curve free: such a
+  curve contains them. They are hidden where the model says one constant stiffness, or a known one;
+- `yielding` of an element that unloads along a line of its own, beside which it would pull;
 - `plastic_unloading` of an element that has not come down to half of its peak force when the record ends;
 - the car of `single` made heavier, or its barrier's gain wrong: M a = -F and F are all that is measured, so both scale
   F alike, and its curve is free;
@@ -57,7 +58,7 @@ FORWARD = 10.0
 
 ON_ELEMENTS = (
     "viscous_damping", "quadratic_damping", "coulomb_friction", "hysteresis", "maxwell_element", "gas_cushion",
-    "rate_hardening", "cubic_stiffness", "bottoming_out", "clearance", "plastic_unloading",
+    "rate_hardening", "cubic_stiffness", "bottoming_out", "yielding", "clearance", "plastic_unloading",
 )  # fmt: skip
 
 SHOWS_OUTSIDE = 3.0 * SHOWS
@@ -111,6 +112,8 @@ def targets(specimen: Specimen, peaks: Peaks, effect: str) -> list[str]:
             return pressed
         case "plastic_unloading":
             return [e for e in pressed if peaks.drop[e] >= UNLOADS]
+    if effect == "yielding":  # what unloads along a line has its own
+        pressed = [e for e in pressed if not carrier_of(specimen.element(e)).unloading]
     known = specimen.model["elements"]  # not one that is hidden itself
     return [e for e in pressed if e in known and specimen.told(e) != "curve"]
 

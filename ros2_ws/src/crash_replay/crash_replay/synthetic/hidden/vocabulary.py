@@ -114,6 +114,14 @@ def bottoming_out(specimen, peaks, target, share, rng):
     return _parallel(specimen, target, laws.bottoming_out(c, stop)), hidden
 
 
+def yielding(specimen, peaks, target, share, rng):
+    """At a third to two thirds of the crush; a third to nine tenths of its stiffness is lost for a nominal share."""
+    at = float(rng.uniform(0.33, 0.66) * peaks.crush[target])
+    c = 2.6 * share * peaks.force[target] / peaks.crush[target]
+    hidden = Hidden("yielding", target, c, "N/m", {"yield_crush": at})
+    return _parallel(specimen, target, laws.yielding(c, at)), hidden
+
+
 def clearance(specimen, peaks, target, share, rng):
     gap = 0.5 * share * peaks.crush[target]
     return specimen.with_law(target, gap=gap, tension=False), Hidden("clearance", target, gap, "m")
@@ -216,7 +224,7 @@ VOCABULARY: Mapping[str, Hide] = {
     hide.__name__: hide
     for hide in (
         viscous_damping, quadratic_damping, coulomb_friction, hysteresis, maxwell_element, gas_cushion,
-        rate_hardening, cubic_stiffness, clearance, bottoming_out, plastic_unloading, load_path, added_mass,
+        rate_hardening, cubic_stiffness, clearance, bottoming_out, yielding, plastic_unloading, load_path, added_mass,
         unmodelled_body, constant_force, guide_friction, initial_velocity, channel_delay, channel_gain, channel_offset,
         force_offset,
     )

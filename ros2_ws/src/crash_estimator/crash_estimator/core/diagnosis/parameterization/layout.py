@@ -209,9 +209,9 @@ def _term(b: Builder, addition: Addition, magnitudes: Magnitudes) -> Term:
     effect = addition.effect
     std = magnitudes.coefficient(addition)
     start = addition.coefficient if addition.coefficient is not None else 0.0
-    low = effect.lowest(magnitudes, addition)
-    start = min(max(start, low), effect.high)
-    coefficient = b.add(f"{effect.name} {addition.target}", start, std, low=low, high=effect.high)
+    low, high = effect.limits(magnitudes, addition)
+    start = min(max(start, low), high)
+    coefficient = b.add(f"{effect.name} {addition.target}", start, std, low=low, high=high)
     shapes = {}
     for name, shape in effect.shapes_of(addition.variant).items():
         unit = magnitudes.shape_unit(shape, addition.target)

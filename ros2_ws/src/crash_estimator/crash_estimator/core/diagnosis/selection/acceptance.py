@@ -71,7 +71,8 @@ def needed_gain(white: bool, found: int) -> float:
 
 
 def needed_share(added: Sequence[Addition]) -> float:
-    """Of the misfit, that effects must explain to be believed where they leave more than noise, by the first of them: a
-    law with two shape constants bends far enough to follow most of what no vocabulary has."""
-    bends_far = any(len(one.effect.shapes_of(one.variant)) > 1 for one in added[:1])
-    return THRESHOLDS.all_but_folds if bends_far else THRESHOLDS.named_share
+    """Of the misfit, that effects must explain to be believed where they leave more than noise: a law that bends far
+    follows most of what no vocabulary has, as one with two shape constants does that comes first."""
+    bends_far = any(one.effect.bends_far for one in added)
+    two_shapes = any(len(one.effect.shapes_of(one.variant)) > 1 for one in added[:1])
+    return THRESHOLDS.all_but_folds if bends_far or two_shapes else THRESHOLDS.named_share

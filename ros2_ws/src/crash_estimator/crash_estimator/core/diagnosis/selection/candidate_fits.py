@@ -51,6 +51,9 @@ def fit_candidates(
     by_motion = [] if model.white else screen(*given)
     worth = [one for one in by_fit if one.gain > THRESHOLDS.worth_fitting]
     search.from_motion(shortlist(by_motion, short))
+    # what a model lacked on one element it may well lack on another
+    had = {one.effect.name for one in model.additions if one.effect.acts_on == "element"}
+    search.from_motion(shortlist([one for one in by_motion if one.addition.effect.name in had], short))
     search.from_model(shortlist(worth, short))
     search.go_on_from([one for one in in_other_noise if one.fit][:short])
     if thorough and model.residuals.mean_square < THRESHOLDS.near_floor:

@@ -80,7 +80,7 @@ def screen(
     found = np.clip(b / precision, low, high)
     # of a coefficient that cannot be negative, prior and posterior are halves of normal distributions
     half = np.where(low == 0.0, np.log(2.0) + log_ndtr(b / np.sqrt(precision)), 0.0)
-    free = np.where(low == 0.0, b / precision, found)
+    free = np.where(low == 0.0, np.minimum(b / precision, high), found)
     gain = b * free - 0.5 * precision * free**2 - 0.5 * np.log(precision * std**2) + half
     rows = zip([*additive, *laws], gain.tolist(), found.tolist(), (precision**-0.5).tolist(), strict=True)
     return sorted((Screened(*row) for row in rows), key=lambda one: -one.gain)

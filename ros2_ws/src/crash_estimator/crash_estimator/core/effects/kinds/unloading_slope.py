@@ -53,5 +53,5 @@ class UnloadingSlope(Effect):
     def prior_std(self, magnitudes, addition):
         return STEEPEST * magnitudes.stiffness[magnitudes.element(addition.target)]
 
-    def lowest(self, magnitudes, addition):
-        return LEAST * magnitudes.stiffness[magnitudes.element(addition.target)]
+    def limits(self, magnitudes, addition):
+        return LEAST * magnitudes.stiffness[magnitudes.element(addition.target)], self.high

@@ -1,0 +1,39 @@
+"""An element that gives way: F = - c (X - yield_crush) where the crush X exceeds that, in parallel to the element's own.
+
+X in m, compression positive; c in N/m, never negative, is the stiffness that is lost there; where it yields is found.
+As large as the element's own stiffness k it is a force limiter, with a plateau at k times `yield_crush`; smaller, a
+curve of two slopes. Of an element whose stiffness is known no more is lost than it has. A free curve of an elastic
+element contains it, so it is offered where the element's stiffness is one constant or known, or unloads along a line.
+The way back is the way that it came; form `in_curve`: it is a part of the spring's own curve, and unloads along the
+same line.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .base import ElementForce, ElementMotion, Shape
+
+
+@dataclass(frozen=True)
+class Loss(ElementForce):
+    """Stiffness that an element loses."""
+
+    def limits(self, magnitudes, addition):
+        stiffness = magnitudes.structure.elements[magnitudes.element(addition.target)].stiffness
+        return self.low, self.high if stiffness.estimated else stiffness.value
+
+
+def force(motion: ElementMotion, yield_crush: float):
+    return -np.maximum(motion.crush - yield_crush, 0.0)
+
+
+EFFECT = Loss(
+    "yielding",
+    "N/m",
+    {"yield_crush": Shape("m", 0.03, 0.97, (0.1, 0.3, 0.6), of_crush=True)},
+    force=force,
+    of_crush_only=True,
+    bends_far=True,
+)
+"""Limits of `yield_crush` as of a stop, and lower: a limiter yields early."""
