@@ -247,6 +247,7 @@ def test_the_noise_is_taken_larger_until_it_stays_as_it_is(monkeypatch, changes,
     ([], THRESHOLDS.named_share), (["hysteresis"], THRESHOLDS.all_but_folds),
     (["coulomb_friction", "hysteresis"], THRESHOLDS.named_share),
     (["yielding"], THRESHOLDS.all_but_folds), (["coulomb_friction", "yielding"], THRESHOLDS.all_but_folds),
+    (["bottoming_out", "yielding"], 1.0),
 ])  # fmt: skip
 def test_a_law_that_bends_far_must_explain_nearly_all(added, share):
     additions = [Addition(EFFECTS[name], "spring", variant=EFFECTS[name].variants[0]) for name in added]

@@ -262,3 +262,9 @@ def test_a_time_zero_counts_as_what_was_added_where_no_effect_was(monkeypatch, e
     with pytest.raises(Judged):
         report._answer(SimpleNamespace(place_of=str), path, SimpleNamespace(stated=False), zero)
     assert asked == [counted]
+
+
+def test_no_time_zero_is_sought_where_the_model_as_stated_leaves_noise():
+    """A simulated car that lacks nothing was told a time zero and an unloading line, with a larger error."""
+    nothing = SimpleNamespace(final=SimpleNamespace(white=True), added=())
+    assert report._from_a_sharper_time_zero(None, (), {}, nothing, None) is None

@@ -1,4 +1,4 @@
-"""An element that gives way: F = - c (X - yield_crush) where the crush X exceeds that, in parallel to the element's own.
+"""An element that gives way: F = - c (X - yield_crush) where the crush X exceeds that, beside the element's own force.
 
 X in m, compression positive; c in N/m, never negative, is the stiffness that is lost there; where it yields is found.
 As large as the element's own stiffness k it is a force limiter, with a plateau at k times `yield_crush`; smaller, a

@@ -150,6 +150,8 @@ def _from_a_sharper_time_zero(
     """What is found from where the motion with the first effect that was found begins: where that leaves less than all
     that was found, and then noise, as that does not, or does with more effects. Twice, as what came first may have been
     found for the time zero."""
+    if found.final.white and not (found.added or zero):  # as stated the model lacks nothing
+        return None
     begins = onsets(recordings, as_well=True)
     used = {shift.recording: shift.seconds for shift in zero.shifts} if zero else {}
     shifts = tuple(shift._replace(seconds=used.get(shift.recording, 0.0)) for shift in begins)
