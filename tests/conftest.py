@@ -87,3 +87,18 @@ def cast(crash, streams):
     for name in NAMES:
         cast = cast.with_member(member(*streams[name][:3]))
     return cast
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    """A model, of the text of its file."""
+    from crash_estimator.model_file import load_model
+
+    folder = tmp_path_factory.mktemp("models")
+
+    def made(text: str):
+        path = folder / f"{abs(hash(text))}.yaml"
+        path.write_text(text)
+        return load_model(path)
+
+    return made

@@ -23,7 +23,6 @@ from crash_estimator.core.free_run import free_run
 from crash_estimator.core.kinematics import Kinematics
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.core.structure import ModelError
-from crash_estimator.model_file import load_model
 from crash_replay.recording import Channel, Recording, Test
 
 AXIS = """
@@ -47,18 +46,6 @@ elements:
 """
 BY_ACCELERATION = OSCILLATOR.replace("displacement: mass_x", "acceleration: mass_ax")
 FRICTION, CUBIC, STIFFNESS, DAMPING = 12.0, 4.0e5, 3000.0, 6.0
-
-
-@pytest.fixture(scope="module")
-def model(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("models")
-
-    def made(text: str):
-        path = folder / f"{abs(hash(text))}.yaml"
-        path.write_text(text)
-        return load_model(path)
-
-    return made
 
 
 def recording(name: str, time: np.ndarray, **channels: tuple[str, np.ndarray]) -> Recording:

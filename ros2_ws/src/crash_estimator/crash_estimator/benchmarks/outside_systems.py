@@ -126,18 +126,18 @@ def _recording(name: str, time: np.ndarray, *measured: tuple[Channel, np.ndarray
     return Recording(Test(name, channels), np.rint(time * 1e9).astype(np.int64), np.stack(values, axis=1))
 
 
+def _is_first(found: Diagnosis, effect: str, true: float, within: float) -> bool:
+    """Whether the effect is named first, its coefficient within a share of the true one."""
+    first = found.steps[0] if found.verdict == EFFECT_MISSING and found.steps else None
+    return first is not None and first.effect == effect and abs(first.coefficient / true - 1.0) < within
+
+
 def _is_friction(found: Diagnosis) -> bool:
-    if found.verdict != EFFECT_MISSING or not found.steps:
-        return False
-    first = found.steps[0]
-    return first.effect == "coulomb_friction" and abs(first.coefficient / FRICTION - 1.0) < WITHIN_OF_FRICTION
+    return _is_first(found, "coulomb_friction", FRICTION, WITHIN_OF_FRICTION)
 
 
 def _is_spring(found: Diagnosis, spring: float) -> bool:
-    if found.verdict != EFFECT_MISSING or not found.steps:
-        return False
-    first = found.steps[0]
-    return first.effect == "load_path" and abs(first.coefficient / spring - 1.0) < WITHIN_OF_SPRING
+    return _is_first(found, "load_path", spring, WITHIN_OF_SPRING)
 
 
 def _is_cubic(found: Diagnosis, tested: Recording) -> bool:
