@@ -116,6 +116,19 @@ def test_a_signal_whose_exception_is_lost_comes_again(capsys):
     assert capsys.readouterr().err == ""
 
 
+def test_a_signal_that_a_compiled_module_words_otherwise_still_ends_it(capsys):
+    """As numpy's and pybind11's do while they are being imported."""
+
+    def command():
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except BaseException as error:
+            raise ImportError("initialization failed") from error
+
+    assert guarded(command) == 128 + signal.SIGTERM
+    assert capsys.readouterr().err == ""
+
+
 OF_A_BAG = ["impactor_single.mcap", "--model", "impactor_single"]
 COMMANDS = [
     (estimate, "crash_estimator.cli.work.estimate.load_model", OF_A_BAG),

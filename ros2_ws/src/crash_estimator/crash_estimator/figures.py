@@ -42,7 +42,7 @@ def draw(path: str | Path, panels: Sequence[Panel], columns: int = 2, height: fl
     """
     try:
         from matplotlib.figure import Figure  # late: a terminal table needs no drawing library
-    except ImportError:
+    except ModuleNotFoundError:
         raise ModelError("figures need matplotlib, which is not installed: run tools/setup") from None
     columns = min(columns, len(panels))
     rows = -(-len(panels) // columns)

@@ -52,8 +52,9 @@ def guarded(command: Callable[[], int | None], also: tuple[type[Exception], ...]
     also: exceptions that are no fault of the program either, with a message that can be read.
     """
     readable: tuple[type[Exception], ...] = (Fault, *also)
+    came: list[int] = []
     try:
-        with _signals_end_it(), _no_signal_is_lost(), _threads_complain() as failed:
+        with _signals_end_it(came), _no_signal_is_lost(), _threads_complain() as failed:
             return command() or (AT_FAULT if failed else DONE)
     except Usage:
         raise
@@ -68,14 +69,16 @@ def guarded(command: Callable[[], int | None], also: tuple[type[Exception], ...]
     except OSError as error:
         line = _of_the_system(error)
     except BaseException as error:  # a user's effect may call sys.exit: that is not how a command ends
+        if came:
+            return 128 + came[-1]  # a compiled module that was being imported raised its own error in Ended's place
         line = of_the_program(error)
     complain(line)
     return AT_FAULT
 
 
 @contextmanager
-def _signals_end_it() -> Iterator[None]:
-    """Like Ctrl-C, unless they are dealt with already: a file that is half written would stay.
+def _signals_end_it(came: list[int]) -> Iterator[None]:
+    """Like Ctrl-C, unless they are dealt with already: a file that is half written would stay. came: these signals.
 
     Who deals with them himself, as a node does, still does so afterwards: no signal changes how it has ended. Nor does
     one that comes between the end of a command and that of its program.
@@ -85,6 +88,7 @@ def _signals_end_it() -> Iterator[None]:
     free = {number: handler for number, handler in found.items() if handler in (signal.SIG_DFL, leave)}
 
     def end(number: int, _) -> None:
+        came.append(number)
         raise Ended(number)
 
     try:
