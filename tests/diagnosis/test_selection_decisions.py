@@ -13,7 +13,6 @@ from crash_estimator.core.diagnosis.selection import (
     fitted_model,
     forward_selection,
     pair_search,
-    selection_step,
 )
 from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
 from crash_estimator.core.diagnosis.selection.fitted_model import forces_jump
@@ -115,47 +114,49 @@ def test_an_effect_on_two_elements_is_tried_on_both(monkeypatch, together, pairs
 def test_effects_are_added_one_by_one_as_long_as_they_gain_anything(monkeypatch, gains, added):
     """And no more of them than the most steps there are, whatever they gain."""
     left = iter(gains)
-    path, final = one_by_one(monkeypatch, 100.0, lambda before, fitted: step(before, next(left)))
+    path, final = one_by_one(monkeypatch, 100.0, lambda before: step(before, next(left)), noise_with=1)
     assert len(final.additions) == len(path) - 1 == (THRESHOLDS.few if added is None else added)
+
+
+@pytest.mark.parametrize("noise_with", [3, 4])
+def test_beyond_two_effects_only_one_that_leaves_noise_is_added(monkeypatch, noise_with):
+    path, final = one_by_one(monkeypatch, 50.0, step, noise_with=noise_with)
+    assert len(final.additions) == len(path) - 1 == (3 if noise_with == 3 else 2)
 
 
 @pytest.mark.parametrize(("left", "gain", "added"), [(1.0, 9.0, 0), (1.0, 11.0, 1), (1.2, 9.0, 1), (1.2, 19.0, 1)])
 def test_beside_noise_a_first_effect_must_stand_out_from_none_and_a_second_one_more(monkeypatch, left, gain, added):
     """The last two leave more than noise as given, and noise with the first one: what comes next must gain 20."""
-    path, final = one_by_one(monkeypatch, left, lambda before, fitted: step(before, gain))
+    path, final = one_by_one(monkeypatch, left, lambda before: step(before, gain))
     assert len(final.additions) == len(path) - 1 == added
 
 
-@pytest.mark.parametrize(("left", "fitted"), [(10000.0, [True, True, False]), (100.0, [True] * (1 + THRESHOLDS.few))])
-def test_what_is_still_far_from_noise_is_not_searched_for_more_than_is_believed(monkeypatch, left, fitted):
-    """What is left is looked at, and no candidate fitted to it."""
+@pytest.mark.parametrize(("left", "rare", "fits"), [(10000.0, False, 2), (50.0, False, 3), (2.0, True, 1)])
+def test_what_would_not_be_believed_is_not_fitted(monkeypatch, left, rare, fits):
+    """Far from noise beyond two, and beside a rare effect: what is left is looked at, and no candidate fitted to it."""
     asked = []
-    one_by_one(monkeypatch, left, lambda before, fit: asked.append(fit) or step(before, 500.0 if fit else 0.0))
-    assert asked == fitted
-
-
-def test_beside_a_rare_effect_none_is_fitted(monkeypatch):
-    asked = []
-    one_by_one(
-        monkeypatch, 2.0, lambda before, fit: asked.append(fit) or step(before, 500.0 if fit else 0.0), rare=True
-    )
-    assert asked == [True, False]
+    path, _ = one_by_one(monkeypatch, left, lambda before: asked.append(before) or step(before), rare=rare)
+    assert len(asked) == fits and path[-1].candidates == []
 
 
 def test_what_explains_too_little_is_not_added_and_nothing_after_it(monkeypatch):
     told = [False, True]
-    path, final = one_by_one(monkeypatch, 1e3, lambda before, fitted: step(before), little=lambda *given: told.pop(0))
+    path, final = one_by_one(monkeypatch, 1e3, lambda before: step(before), little=lambda *given: told.pop(0))
     assert len(final.additions) == 1 and final is path[1].before and len(path) == 2 and not told
 
 
 def one_by_one(
-    monkeypatch, left: float, search, rare: bool = False, little=lambda *given: False
+    monkeypatch, left: float, search, rare: bool = False, little=lambda *given: False, noise_with: int = 9
 ) -> tuple[list, SimpleNamespace]:
-    """Each addition takes a tenth of the mean square away; left: of it at first, search: before, fitted."""
-    said = lambda m, e, before, path, fitted: search(before, fitted)  # noqa: E731
+    """Each addition takes a tenth of the mean square away; left: of it at first, search: what is found beside a model,
+    noise_with: additions with which a candidate leaves noise."""
+    white = lambda step: len(step.before.additions) + 1 >= noise_with  # noqa: E731
     monkeypatch.setattr(forward_selection, "common_effects", lambda *given: {})
     monkeypatch.setattr(forward_selection, "is_rare", lambda addition: rare)
-    monkeypatch.setattr(forward_selection, "in_recorded_noise", said)
+    monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda m, e, before, path: search(before))
+    monkeypatch.setattr(forward_selection, "only_screened", lambda m, e, before: SelectionStep(before, []))
+    monkeypatch.setattr(SelectionStep, "leaves_noise", property(white))
+    monkeypatch.setattr(SelectionStep, "with_best", None)
     monkeypatch.setattr(forward_selection, "with_rare_ones", lambda m, e, first: first)
     monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done, path, evenly: done)
     monkeypatch.setattr(forward_selection, "_without", lambda model, found: model)
@@ -164,7 +165,6 @@ def one_by_one(
         "added",
         lambda m, r, before, best: (m, model(0.9 * (before.residuals.mean_square), len(before.additions) + 1)),
     )
-    monkeypatch.setattr(selection_step, "analyse", lambda fit: None)
     monkeypatch.setattr(forward_selection, "band_of_steps", lambda path: None)
     monkeypatch.setattr(forward_selection, "evenly_fitted", lambda *given: "with it")
     monkeypatch.setattr(forward_selection, "explains_too_little", little)

@@ -94,24 +94,16 @@ def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: 
             asked, answers = path, {one: _promised(other, path, path.records) for one, other in others.items()}
         return {one: answers[one] for one in others if answers[one] > -np.inf}
 
-    tried: list[Structure] = []  # under which all has been looked for
+    tried = [structure]
     untried: list[Callable[[Structure], Structure]] = [never_pulling, elastic_when_spent, all_when_spent]
     path = _as_exact_as_needed(structure, records, effects, elsewhere=lambda begun: bool(promised(begun)))
-    tried += [structure] if path.whole else []
     while untried and not out_of_time() and (others := promised(path)):
         best = max(others, key=others.__getitem__)
         untried.remove(best)
         otherwise = _as_exact_as_needed(best(path.structure), path.records, effects, path.added)
         tried.append(otherwise.structure)
         path = max(path, otherwise, key=SelectionPath.rank)
-    if path.final.white or structure in tried or explains_most(path) or out_of_time():
-        return path
-    return max(path, _as_exact_as_needed(structure, records, effects), key=SelectionPath.rank)
-
-
-def explains_most(path: SelectionPath) -> bool:
-    """What was found takes a large share of the misfit away."""
-    return share_removed(path.steps[0].before.residuals, path.final.residuals) > THRESHOLDS.named_share
+    return path
 
 
 def first_believed(path: SelectionPath) -> SelectionPath:

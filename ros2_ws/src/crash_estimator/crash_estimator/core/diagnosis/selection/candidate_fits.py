@@ -29,25 +29,29 @@ class CandidateFit(NamedTuple):
     screened: Screened | None = None
 
 
+def screen_candidates(magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model) -> list[CandidateFit]:
+    """All candidates, likeliest first, one for each effect and target; none is fitted."""
+    additions = candidates(magnitudes, effects, model.additions)
+    screened = screen(magnitudes, model.records, model.additions, additions, model.roughness, model.fit)
+    return _Search(magnitudes, model, screened).ranking()
+
+
 def fit_candidates(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, thorough: bool = False,
-    in_other_noise: Sequence[CandidateFit] = (), earlier: Sequence[CandidateFit] = (), fitted: bool = True,
+    in_other_noise: Sequence[CandidateFit] = (), earlier: Sequence[CandidateFit] = (),
     least: float = np.inf,
 ) -> list[CandidateFit]:  # fmt: skip
     """All candidates, best first; one for each effect and target.
 
     thorough: fit the best of them harder, where none of the most likely ones leaves white noise. in_other_noise: what
     was found with other noise, best first; its best fits are gone on from. earlier: what was found for the models
-    before this one. fitted: not only screened. least: cost that another explanation leaves; what stays far above it is
-    not fitted to the end.
+    before this one. least: cost that another explanation leaves; what stays far above it is not fitted to the end.
     """
     additions = candidates(magnitudes, effects, model.additions)
     given = magnitudes, model.records, model.additions, additions, model.roughness
     by_fit = screen(*given, model.fit)
     short = THRESHOLDS.shortlist
     search = _Search(magnitudes, model, by_fit, least)
-    if not fitted:
-        return search.ranking()
     by_motion = [] if model.white else screen(*given)
     worth = [one for one in by_fit if one.gain > THRESHOLDS.worth_fitting]
     search.from_motion(shortlist(by_motion, short))
@@ -81,7 +85,7 @@ def fit_candidates(
 class _Search:
     """The best fit of each effect and target so far."""
 
-    def __init__(self, magnitudes: Magnitudes, model: Model, screened: Sequence[Screened], least: float):
+    def __init__(self, magnitudes: Magnitudes, model: Model, screened: Sequence[Screened], least: float = np.inf):
         self.magnitudes, self.model, self.screened = magnitudes, model, screened
         self.least = min(model.fit.cost, least)
         self.done: set[tuple[int, Schedule]] = set()

@@ -12,7 +12,7 @@ from .fitted_model import Model
 from .pair_search import Pair, as_expected, near_the_floor, two_at_once, two_of_one_effect
 from .pruning import up_to_the_least_error, without_the_superseded
 from .rare_effects import common_effects, is_rare, with_rare_ones
-from .selection_step import SelectionStep, added, band_of_steps, in_recorded_noise, weighed
+from .selection_step import SelectionStep, added, band_of_steps, in_recorded_noise, only_screened, weighed
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
 
@@ -64,8 +64,7 @@ def _one_by_one(
     common, evenly = common_effects(magnitudes.structure, effects), None
     while not (path and out_of_time()):
         if first is None:
-            fitted = not _as_many_as_believed(model, present)
-            first = in_recorded_noise(magnitudes, common, model, path, fitted)
+            first = _next_step(magnitudes, common, model, path, present)
             first = first if path else with_rare_ones(magnitudes, effects, first)
         done, first = weighed(magnitudes, common, first, path, evenly), None
         path.append(done)
@@ -98,12 +97,19 @@ def _explains_nearly_all(step: SelectionStep) -> bool:
     return bool(left and left > THRESHOLDS.all_but_folds)
 
 
-def _as_many_as_believed(model: Model, present: int) -> bool:
-    """Whether a further addition would not be believed beside those found: a rare one is alone only, and more than two
-    only where they leave noise."""
+def _next_step(
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: Sequence[SelectionStep], present: int
+) -> SelectionStep:
+    """All candidates for one more addition; only screened where none would be believed beside those found: beside a
+    rare one none is, and beyond two only one that leaves noise."""
     found = model.additions[present:]
+    as_many = len(found) >= THRESHOLDS.most_at_once
     far_from_noise = model.residuals.mean_square >= THRESHOLDS.real_structure
-    return any(map(is_rare, found)) or (far_from_noise and len(found) >= THRESHOLDS.most_at_once)
+    if not (any(map(is_rare, found)) or (as_many and far_from_noise)):
+        step = in_recorded_noise(magnitudes, effects, model, path)
+        if step.leaves_noise or not as_many:
+            return step
+    return only_screened(magnitudes, effects, model)
 
 
 def _without(model: Model, found: CandidateFit) -> Model:

@@ -17,7 +17,7 @@ from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
 from ..residuals.in_band import band_of
 from ..residuals.residuals import analyse
 from .acceptance import better
-from .candidate_fits import CandidateFit, fit_candidates
+from .candidate_fits import CandidateFit, fit_candidates, screen_candidates
 from .even_fit import evenly_fitted
 from .fitted_model import Model, fit_model
 from .thresholds import THRESHOLDS
@@ -55,16 +55,21 @@ class SelectionStep(NamedTuple):
 
 
 def in_recorded_noise(
-    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: Sequence[SelectionStep] = (),
-    fitted: bool = True,
-) -> SelectionStep:  # fmt: skip
-    """All candidates against the sensors' noise; path: the steps before; fitted: not only screened.
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: Sequence[SelectionStep] = ()
+) -> SelectionStep:
+    """All candidates against the sensors' noise; path: the steps before.
 
     With care where one would be believed beside those that were found, whatever it leaves.
     """
     earlier = [one for step in path for one in step.candidates]
     thorough = len(path) < THRESHOLDS.most_at_once
-    found = fit_candidates(magnitudes, effects, model, thorough, earlier=earlier, fitted=fitted)
+    found = fit_candidates(magnitudes, effects, model, thorough, earlier=earlier)
+    return SelectionStep(model, found, found)
+
+
+def only_screened(magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model) -> SelectionStep:
+    """All candidates, where none would be believed."""
+    found = screen_candidates(magnitudes, effects, model)
     return SelectionStep(model, found, found)
 
 
@@ -94,9 +99,12 @@ def weighed(
         if before.white:  # so it looks; the sensors' own noise decides
             decided = analyse(fit(model.fit.problem, before.fit.point), sharply=True).band_test
             before = before._replace(residuals=before.residuals._replace(band_test=decided))
-        # what has come up in a larger noise is gone on from in the next, but where a jump would hold it where it is
-        new = [o for o in done.candidates[:1] if o.addition.key not in fits and not o.addition.effect.profiled]
-        others = fit_candidates(magnitudes, effects, before, in_other_noise=[*new, *found], fitted=bool(fits))
+        if fits:
+            # what has come up in a larger noise is gone on from in the next, but where a jump would hold it where it is
+            new = [o for o in done.candidates[:1] if o.addition.key not in fits and not o.addition.effect.profiled]
+            others = fit_candidates(magnitudes, effects, before, in_other_noise=[*new, *found])
+        else:
+            others = screen_candidates(magnitudes, effects, before)
         done = SelectionStep(before, others, found)
     known = [evenly] if evenly else []
     return done._replace(evenly=evenly_fitted(done.before, band_of_steps([*path, done]), *known))

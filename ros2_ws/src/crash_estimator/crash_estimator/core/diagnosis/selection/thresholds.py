@@ -62,9 +62,7 @@ class Thresholds(NamedTuple):
     """Of the misfit, that what is named must explain, where what is left is no noise. Of 36 cases of the second
     simulator that were right so, and had been looked at, 35 explained 0.77 and more. By the fit that counts all outputs
     alike: of 15 development cases outside the vocabulary to which an effect was added 13 had 0.75 and less, the other
-    two are not named for another reason; what is named rightly on docs/outside.md has 0.80 and more.
-    Contacts under which that much is explained are not left for the stated ones: in 4 cases of 43 they were asked once
-    more, never with a better answer."""
+    two are not named for another reason; what is named rightly on docs/outside.md has 0.80 and more."""
     varying: float = 0.45
     """Share of what is left that goes along with something varying in time: from it on no effect is named. Of 15
     development cases outside the vocabulary to which an effect was added 7 had 0.55 and more, and 0.36 at most those
