@@ -114,6 +114,18 @@ def test_what_was_followed_one_by_one_is_not_followed_again_in_a_pair(monkeypatc
     assert tried == [("damping", "a")]
 
 
+@pytest.mark.parametrize(("white", "asked"), [(False, [{"friction", "gas"}]), (True, [])])
+def test_where_one_by_one_leaves_more_than_noise_pairs_are_tried_rare_effects_among_them(monkeypatch, white, asked):
+    tried, effects = [], {"friction": 1, "gas": 2}
+    first = SimpleNamespace(leaves_noise=True, candidates=[], best=candidate(500.0), before=model(), as_recorded=[])
+    monkeypatch.setattr(forward_selection, "common_effects", lambda structure, every: {"friction": 1})
+    monkeypatch.setattr(forward_selection, "out_of_time", lambda: False)
+    monkeypatch.setattr(forward_selection, "_one_by_one", lambda *given: ([first], model(white=white)))
+    monkeypatch.setattr(forward_selection, "two_at_once", lambda m, effects, *given: tried.append(set(effects)))
+    path, _ = forward_selection.forward_selection(MAGNITUDES, effects, model(), first)
+    assert path == [first] and tried == asked
+
+
 def test_a_search_out_of_time_has_looked_at_all_candidates_once(monkeypatch):
     step = SimpleNamespace(best=None, before=None, candidates=[])
     monkeypatch.setattr(forward_selection, "out_of_time", lambda: True)

@@ -8,6 +8,7 @@ from crash_replay.synthetic.hidden.outside import OUTSIDE
 from crash_replay.synthetic.hidden.structures import STRUCTURES
 from crash_replay.synthetic.hidden.vocabulary import VOCABULARY
 
+from ..core.effects import EFFECTS
 from ..figures import markdown_table
 from .effects_judge import WANTED, a_stop_for_a_gap, both_found, kind_of, pull, right_first, rival_named, verdict_is
 from .effects_plan import FULL, HARD_NOISES, NOISES, SIZES, SLOW, Case, case_of
@@ -167,12 +168,14 @@ def _coefficients(drawn: Sequence[Judged]) -> str:
 
 def _two(drawn: Sequence[Judged]) -> str:
     chosen = _pick(drawn, "two", 2)
-    rows = []
-    for structure in (*STRUCTURES, "all"):
-        these = [j for j in chosen if structure in ("all", j.case.structure)]
-        rows.append(
-            (_code(structure), str(_share(these, both_found)), str(_share(these, verdict_is("effect_missing"))))
-        )
+    with_rare = [j for j in chosen if any(EFFECTS[effect].rare for effect in j.case.effects)]
+    groups = [(_code(structure), [j for j in chosen if j.case.structure == structure]) for structure in STRUCTURES]
+    groups += [("all", chosen), ("both looked for first", [j for j in chosen if j not in with_rare])]
+    groups += [("one or both looked for last", with_rare)]
+    rows = [
+        (name, str(_share(these, both_found)), str(_share(these, verdict_is("effect_missing"))))
+        for name, these in groups
+    ]
     return markdown_table(("structure", "both found, nothing else", "`effect_missing`"), rows)
 
 

@@ -33,7 +33,7 @@ def forward_selection(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], given: Model, first: SelectionStep | Pair
 ) -> tuple[list[SelectionStep], Model]:
     """All steps, and the last model; given: what it starts from, first: its `first_step`."""
-    present, common = len(given.additions), common_effects(magnitudes.structure, effects)
+    present = len(given.additions)
     alike: list[Pair] = []
     pair, step = (first, None) if isinstance(first, Pair) else (None, first)
     if step and not (step.leaves_noise or _explains_nearly_all(step) or out_of_time()):
@@ -45,7 +45,7 @@ def forward_selection(
     next_to_nothing = share_removed(given.residuals, final.residuals) > THRESHOLDS.all_but_folds
     if final.white or next_to_nothing or out_of_time():
         return path, final
-    pair = two_at_once(magnitudes, common, given, path[0].as_recorded, alike, _followed(path, present))
+    pair = two_at_once(magnitudes, effects, given, path[0].as_recorded, alike, _followed(path, present))
     if pair is None:
         return path, final
     other = _one_by_one(pair.magnitudes, effects, pair.model, pair.path, present)

@@ -1,6 +1,6 @@
 """Rare effects bend far, and one of them with another beside it would follow most that no vocabulary has: they are
-asked after the common ones, in a first step only, and believed only where one of them alone leaves noise, or next to
-nothing else where no common one comes near."""
+asked after the common ones, and believed only where one of them alone leaves noise, or next to nothing else where no
+common one comes near; or in a pair, beside a common one, that leaves noise where those one by one do not."""
 
 from collections.abc import Iterable, Mapping
 
