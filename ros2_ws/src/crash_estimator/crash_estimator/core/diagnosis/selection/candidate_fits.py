@@ -38,8 +38,7 @@ def screen_candidates(magnitudes: Magnitudes, effects: Mapping[str, Effect], mod
 
 def fit_candidates(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, thorough: bool = False,
-    in_other_noise: Sequence[CandidateFit] = (), earlier: Sequence[CandidateFit] = (),
-    least: float = np.inf,
+    in_other_noise: Sequence[CandidateFit] = (), earlier: Sequence[CandidateFit] = (), least: float = np.inf,
 ) -> list[CandidateFit]:  # fmt: skip
     """All candidates, best first; one for each effect and target.
 
