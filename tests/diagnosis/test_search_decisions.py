@@ -260,9 +260,10 @@ def in_larger_noise(monkeypatch, changes) -> list:
     ([], THRESHOLDS.named_share), (["hysteresis"], THRESHOLDS.all_but_folds),
     (["coulomb_friction", "hysteresis"], THRESHOLDS.named_share),
     (["yielding"], THRESHOLDS.all_but_folds), (["coulomb_friction", "yielding"], THRESHOLDS.all_but_folds),
+    (["bottoming_out"], THRESHOLDS.all_but_folds), (["clearance"], THRESHOLDS.named_share),
     (["bottoming_out", "yielding"], 1.0),
 ])  # fmt: skip
-def test_a_law_that_bends_far_must_explain_nearly_all(added, share):
+def test_a_curve_or_a_law_with_two_constants_must_explain_nearly_all(added, share):
     additions = [Addition(EFFECTS[name], "spring", variant=EFFECTS[name].variants[0]) for name in added]
     assert needed_share(additions) == share
 

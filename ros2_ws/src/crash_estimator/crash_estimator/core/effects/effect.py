@@ -70,7 +70,6 @@ class Effect:
     size: float | None = None  # order of magnitude of the coefficient; None: what carries half of the target's force
     of_crush_only: bool = False  # its force is a function of the crush alone
     of_rate_only: bool = False  # or of the rate
-    bends_far: bool = False  # its law follows most of what no vocabulary has: it has to explain more to be named
     rare: bool = False  # looked for only where the others leave more than noise, or take several to leave it
     forms: Mapping[str, Sequence[str]] = field(default_factory=dict)
     """Name of a form of its law -> names of its shape constants, where it has several; all but the first are rare."""

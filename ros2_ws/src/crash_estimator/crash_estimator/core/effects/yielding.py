@@ -34,6 +34,5 @@ EFFECT = Loss(
     {"yield_crush": Shape("m", 0.03, 0.97, (0.1, 0.3, 0.6), of_crush=True)},
     force=force,
     of_crush_only=True,
-    bends_far=True,
 )
 """Limits of `yield_crush` as of a stop, and lower: a limiter yields early."""

@@ -251,7 +251,10 @@ def _drift_left_by(path: SelectionPath, sized: Model) -> Drift:
 
 
 def _explained_by_first_effect(models: Sequence[Model], added: Sequence[Addition], cfc: int | None) -> float:
-    """Share of the misfit in the band; what one element lacks another may as well, then the two count as one."""
+    """Share of the misfit in the band; what one element lacks another may as well, then the two count as one. Nothing
+    of an inertia, a given force or a channel's error: no law of theirs may be written another way."""
+    if not added or added[0].effect.acts_on not in ("element", "between"):
+        return 0.0
     effects = [addition.effect.name for addition in added]
     alike = next((k for k, effect in enumerate(effects) if effect != effects[0]), len(effects))
     given, left = (in_band(one.fit, one.residuals, cfc) for one in (models[0], models[alike]))

@@ -71,12 +71,11 @@ def needed_gain(white: bool, found: int) -> float:
 
 
 def needed_share(added: Sequence[Addition]) -> float:
-    """Of the misfit, that effects must explain to be believed where they leave more than noise: a law that bends far
-    follows most of what no vocabulary has, as one with two shape constants does that comes first. Two functions of the
-    crush of one element are a curve that follows anything: no share is enough."""
+    """Of the misfit, that effects must explain to be believed where they leave more than noise: a function of the crush
+    follows most of a fold or a break, which no vocabulary has, and one with two shape constants that comes first most
+    else. Two functions of the crush of one element are a curve that follows anything: no share is enough."""
     curves = [one.target for one in added if one.effect.of_crush_only]
     if len(set(curves)) < len(curves):
         return 1.0
-    bends_far = any(one.effect.bends_far for one in added)
     two_shapes = any(len(one.effect.shapes_of(one.variant)) > 1 for one in added[:1])
-    return THRESHOLDS.all_but_folds if bends_far or two_shapes else THRESHOLDS.named_share
+    return THRESHOLDS.all_but_folds if curves or two_shapes else THRESHOLDS.named_share
