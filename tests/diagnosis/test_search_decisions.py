@@ -221,39 +221,34 @@ def test_a_larger_noise_is_that_of_a_candidate_that_gains(monkeypatch):
     assert found.of == 300.0
 
 
+@pytest.mark.parametrize("fitted", [True, False])
 @pytest.mark.parametrize(("changes", "times"), [((1.0, 0.06, 0.06), 3), ((1.0, 0.04, 0.06), 1), ((0.01, 0.04), 1)])
-def test_the_noise_is_taken_larger_until_it_stays_as_it_is(monkeypatch, changes, times):
-    """However little it changes the first time: until then it was the sensors'."""
-    given = model()
-    larger = in_larger_noise(monkeypatch, changes)
-    monkeypatch.setattr(selection_step, "screen_candidates", lambda *given: [])
-    selection_step.weighed(None, {}, selection_step.SelectionStep(given, [candidate(9.0, fitted=False)]))
-    assert len(larger) == times
-
-
-def in_larger_noise(monkeypatch, changes) -> list:
-    """By how much the noise is louder each time -> the records with it, as they are fitted."""
-    quietness, larger = 0.0, []
+def test_the_noise_is_taken_larger_until_it_stays_as_it_is(monkeypatch, changes, times, fitted):
+    """However little it changes the first time: until then it was the sensors'. What was only screened still is."""
+    quietness, larger, ways = 0.0, [], []
 
     def louder(step, records):
         nonlocal quietness
         quietness -= changes[len(larger)]
         return (SimpleNamespace(whitener=np.exp(quietness / 2) * np.eye(2)),)
 
-    def fitted(magnitudes, records, additions):
+    def refitted(magnitudes, records, additions):
         larger.append(records)
-        refitted = SimpleNamespace(**vars(model()) | {"records": records})
-        refitted.fit.problem, refitted.fit.point = SimpleNamespace(narrowed=lambda *given: None), None
-        refitted.fit.layout = None
-        refitted.refitted = lambda *given: refitted
-        return refitted
+        before = SimpleNamespace(**vars(model()) | {"records": records})
+        before.fit.problem = SimpleNamespace(narrowed=lambda *given: None)
+        before.refitted = lambda *given: before
+        return before
 
+    monkeypatch.setattr(selection_step, "analyse", lambda fit: SimpleNamespace(white=False))
     monkeypatch.setattr(selection_step, "_noise_left_by", louder)
-    monkeypatch.setattr(selection_step, "fit_model", fitted)
+    monkeypatch.setattr(selection_step, "fit_model", refitted)
     monkeypatch.setattr(selection_step, "better", lambda one, other: False)
+    monkeypatch.setattr(selection_step, "fit_candidates", lambda *given, in_other_noise: ways.append("fitted") or [])
+    monkeypatch.setattr(selection_step, "screen_candidates", lambda *given: ways.append("screened") or [])
     monkeypatch.setattr(selection_step, "band_of_steps", lambda steps: None)
     monkeypatch.setattr(selection_step, "evenly_fitted", lambda *given: None)
-    return larger
+    selection_step.weighed(None, {}, selection_step.SelectionStep(model(), [candidate(500.0, fitted=fitted)]))
+    assert len(larger) == times and ways == ["fitted" if fitted else "screened"] * times
 
 
 @pytest.mark.parametrize(("added", "share"), [

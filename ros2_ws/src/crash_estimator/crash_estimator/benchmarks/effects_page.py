@@ -176,7 +176,7 @@ def _two(drawn: Sequence[Judged]) -> str:
         (name, str(_share(these, both_found)), str(_share(these, verdict_is("effect_missing"))))
         for name, these in groups
     ]
-    return markdown_table(("structure", "both found, nothing else", "`effect_missing`"), rows)
+    return markdown_table(("cases", "both found, nothing else", "`effect_missing`"), rows)
 
 
 def _is(what: str, value: float, judged: Judged) -> bool:
