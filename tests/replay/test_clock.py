@@ -13,6 +13,7 @@ from crash_replay.player import Batch
 from crash_replay.qos import STREAM
 from crash_replay.replay_topics import ReplayTopics
 from crash_replay.ros_messages import stamp_ns
+from crash_replay.subscribers import UNNAMED
 
 RECORDING = some_recording()
 STAMPS = (RECORDING.time_ns + time_zero_ns(RECORDING)).tolist()
@@ -26,7 +27,10 @@ def clocks_of(listener) -> list[int]:
 
 
 def publishers(listener) -> list[str]:
-    return sorted(info.node_name for info in listener.node.get_publishers_info_by_topic("/clock"))
+    """By name, once the listener knows each by name: a publisher may be seen before the node that it belongs to."""
+    found = listener.node.get_publishers_info_by_topic
+    wait_until(lambda: all(info.node_name != UNNAMED for info in found("/clock")))
+    return sorted(info.node_name for info in found("/clock"))
 
 
 def test_it_is_told_before_the_samples_of_its_time(listener):
