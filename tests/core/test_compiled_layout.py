@@ -51,12 +51,13 @@ def test_each_setting_of_a_method_comes_back_in_its_place():
 def test_the_kept_part_of_a_matrix_is_inverted_and_a_singular_one_gives_no_number():
     rng = np.random.default_rng(0)
     half = rng.standard_normal((5, 5)) * [1e5, 1.0, 1e-3, 10.0, 1.0]  # units as far apart as N/m and N s/m
-    matrix, keep, found = half.T @ half, np.array([1.0, 0.0, 1.0, 1.0, 1.0]), np.empty((5, 5))
-    invert(matrix, keep, found)
+    matrix, keep, found = half.T @ half, np.array([1.0, 0.0, 1.0, 1.0, 1.0]), half.T @ half
+    invert(found, keep, np.empty(5))
     kept = np.flatnonzero(keep)
     inner = np.ix_(kept, kept)
     assert_allclose(found[inner] @ matrix[inner], np.eye(4), atol=1e-6)
     assert not found[1].any() and not found[:, 1].any()
     with np.errstate(all="ignore"):  # of which compiled code says nothing
-        invert(np.zeros((5, 5)), keep, found)
+        found[:] = 0.0
+        invert(found, keep, np.empty(5))
     assert not np.isfinite(found[inner]).any()

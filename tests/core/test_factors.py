@@ -117,8 +117,7 @@ def test_what_is_left_of_the_residuals_is_the_noise_less_what_has_been_fitted_to
 
 @pytest.mark.parametrize(("known", "least"), [(4.0, 4.0), (np.nan, QUIETEST**2)])
 def test_noise_that_adapts_to_a_model_without_errors_stays_at_what_is_known_of_the_sensor(monkeypatch, known, least):
-    for other in ("pass_one", "_left"):  # of which nothing is asked here
-        monkeypatch.setattr(kalman, other, lambda *given: None)
+    monkeypatch.setattr(kalman, "pass_one", lambda *given: None)  # of which nothing is asked here
     noise, one, square = np.array([np.nan]), np.ones(1), np.ones((1, 1))
     errors = np.zeros((3, 1, 1))
     state = kalman.Filter(2.0 * one, square.copy(), noise, np.zeros((1, 1)), errors)
@@ -128,7 +127,9 @@ def test_noise_that_adapts_to_a_model_without_errors_stays_at_what_is_known_of_t
         seen=one.copy(),
     )  # fmt: skip
     limits, method = kalman.Limits(-UNBOUNDED[:1], UNBOUNDED[:1], one), MethodPlan(True, False, noise_memory=1e-12)
-    plain(kalman.filtered)(limits, method, state, 1e-3, room, np.zeros(1), square.copy(), one.copy())
+    plain(kalman.let_walk)(limits, state, room)
+    plain(kalman.update)(limits, method, state, room, np.zeros(1))
+    plain(kalman.adapt)(method, state, 1e-3, room)
     assert_array_equal(noise, [least])
 
 

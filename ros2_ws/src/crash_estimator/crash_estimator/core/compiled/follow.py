@@ -36,10 +36,11 @@ def follow(whole, others, state, times_ns, values, rows):
         w.clamped[:] = 0.0
         row.rewinds[0] = 0.0
         if dt > 0.0 and excited:
-            for b in range(n.offsets):
-                if s.squares[b] > 0.0:  # its zero is estimated
-                    w.zero[b] = 0.0
-            known_of(w.zero, w.density, plan.velocity_variance, time, w.errors)
+            if n.offsets:
+                for b in range(n.offsets):
+                    if s.squares[b] > 0.0:  # its zero is estimated
+                        w.zero[b] = 0.0
+                known_of(w.zero, w.density, plan.velocity_variance, time, w.errors)
             move_on(s, time)
             if method.is_kalman:
                 kalman_step(plan, method, n, s, row, dt, w)

@@ -110,7 +110,11 @@ def kalman_step(plan, method, n, s, row, dt, w):
         w.target[i] = row.measured[i] - w.known[i]
     limits = Limits(plan.lower, plan.upper, plan.scale)
     both = Filter(s.theta, s.factors, s.noise, s.beside, s.beside_shared)
-    filtered(limits, method, both, dt, w, w.clamped, row.innovation_covariance, row.residual_std)
+    let_walk(limits, both, w)
+    seen_through(s.factors, w.gradient, s.noise, w.through, row.innovation_covariance)
+    update(limits, method, both, w, w.clamped)
+    _left(both, w, row.residual_std)
+    adapt(method, both, dt, w)
     product_of(s.factors, s.covariance)
     for j in range(n.estimated):
         for k in range(n.estimated):
@@ -118,34 +122,42 @@ def kalman_step(plan, method, n, s, row, dt, w):
 
 
 @njit(cache=True, inline="always")
-def filtered(limits, method, f, dt, w, clamped, innovation_covariance, residual_std):
-    """Random walk, update, and adaptation of R2 to what the model cannot follow; w: `layout.SCRATCH`."""
-    p, q = len(f.theta), len(w.target)
+def let_walk(limits, f, w):
+    """A step of the random walk; at the first one R2 starts from what is known of the sensors. w: `layout.SCRATCH`."""
     for j in range(len(w.walk)):
         size = max(abs(f.theta[j]), SMALLEST_SHARE * limits.scale[j])
         if w.walk[j] > 0.0:
             widen(f.factors, w.walk[j] * size**2, j, w.unit)
-    for i in range(q):
+    for i in range(len(w.target)):
         if np.isnan(f.noise[i]):
             f.noise[i] = w.learnt[i] if w.learnt[i] == w.learnt[i] else 1.0
-    seen_through(f.factors, w.gradient, f.noise, w.through, innovation_covariance)
+
+
+@njit(cache=True, inline="always")
+def update(limits, method, f, w, clamped):
+    """By one sample, of the errors that are counted beside, too."""
+    p = len(f.theta)
     for j in range(p):
         w.unfiltered[j] = f.theta[j]
     kalman_update(
         f.theta, f.factors, f.noise, w.gradient, w.target, w.active, limits.lower, limits.upper, method.constrained,
         clamped, w.gain,
     )  # fmt: skip
-    for i in range(q):
+    for i in range(len(w.target)):
         if w.target[i] == w.target[i]:
             for j in range(p):  # one at its bound counts as known, as it does in P
                 w.seen[j] = 0.0 if clamped[j] else w.gradient[i, j]
             pass_one(f.beside, f.shared, w.gain[:, i], w.seen, w.by_errors[:, i], w.errors, w.unit)
-    _left(f, w, residual_std)
+
+
+@njit(cache=True, inline="always")
+def adapt(method, f, dt, w):
+    """R2, to what the model cannot follow."""
     if method.noise_memory > 0.0:
         share = dt / (dt + method.noise_memory)
-        for i in range(q):
+        for i in range(len(w.target)):
             residual, innovation, learnt = w.target[i], w.target[i], w.learnt[i]
-            for j in range(p):
+            for j in range(len(f.theta)):
                 residual -= w.gradient[i, j] * f.theta[j]
                 innovation -= w.gradient[i, j] * w.unfiltered[j]
             product = residual * innovation

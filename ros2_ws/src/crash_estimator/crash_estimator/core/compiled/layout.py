@@ -106,9 +106,8 @@ SCRATCH: Shapes = {
     "unit": ("unknowns",),
     "unfiltered": ("unknowns",),
     "spread": ("equations", "equations"),
-    "held": ("unknowns",),  # of the filter beside RLS, as the next two
-    "expected": ("equations", "equations"),
-    "left": ("equations",),
+    "error": ("equations",),
+    "held": ("unknowns",),  # of the filter beside RLS
 }
 """Room for what is computed anew at every sample."""
 

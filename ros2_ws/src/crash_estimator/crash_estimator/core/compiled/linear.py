@@ -5,43 +5,44 @@ from numba import njit
 
 
 @njit(cache=True, error_model="numpy")
-def invert(matrix, keep, out):
-    """Inverse of the kept rows and columns of a symmetric positive matrix, zero elsewhere; not finite if singular.
+def invert(matrix, keep, scale):
+    """Inverse, in place, of the kept rows and columns of a symmetric positive matrix, zero elsewhere; not finite if
+    singular; scale (n,) is scratch.
 
     Its diagonal is scaled to 1 (N/m beside N s/m); then Gauss-Jordan, which needs no pivoting for such a matrix.
     """
     n = len(matrix)
-    scale = np.zeros(n)
     for j in range(n):
-        if keep[j]:
-            scale[j] = 1.0 / np.sqrt(matrix[j, j])
+        scale[j] = 1.0 / np.sqrt(matrix[j, j]) if keep[j] else 0.0
     for j in range(n):
         for k in range(n):
-            out[j, k] = matrix[j, k] * scale[j] * scale[k] if keep[j] and keep[k] else 0.0
+            matrix[j, k] = matrix[j, k] * scale[j] * scale[k] if keep[j] and keep[k] else 0.0
     for pivot in range(n):
         if not keep[pivot]:
             continue
-        inverse = 1.0 / out[pivot, pivot]
-        out[pivot, pivot] = 1.0
+        inverse = 1.0 / matrix[pivot, pivot]
+        matrix[pivot, pivot] = 1.0
         for k in range(n):
-            out[pivot, k] *= inverse
+            matrix[pivot, k] *= inverse
         for j in range(n):
-            if j != pivot and keep[j]:
-                factor = out[j, pivot]
-                out[j, pivot] = 0.0
+            factor = matrix[j, pivot]
+            if j != pivot and factor != 0.0:
+                matrix[j, pivot] = 0.0
                 for k in range(n):
-                    out[j, k] -= factor * out[pivot, k]
+                    matrix[j, k] -= factor * matrix[pivot, k]
     for j in range(n):
         for k in range(n):
-            out[j, k] *= scale[j] * scale[k]
+            matrix[j, k] *= scale[j] * scale[k]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def multiply(a, b, out):
-    """out = a b: for a few rows, a loop is done before the linear algebra library is called."""
-    for j in range(a.shape[0]):
-        for k in range(b.shape[1]):
-            total = 0.0
-            for i in range(a.shape[1]):
-                total += a[j, i] * b[i, k]
-            out[j, k] = total
+    """out = a b, of which a may have many zeros: for a few rows, that is done before the linear algebra library is
+    called."""
+    for j in range(out.shape[0]):
+        for k in range(out.shape[1]):
+            out[j, k] = 0.0
+        for i in range(a.shape[1]):
+            if a[j, i] != 0.0:
+                for k in range(out.shape[1]):
+                    out[j, k] += a[j, i] * b[i, k]

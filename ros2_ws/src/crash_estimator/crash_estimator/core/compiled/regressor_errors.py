@@ -61,10 +61,10 @@ def _moved(shared, dt):
             shared[2, b, j] += (u + 0.5 * z * dt) * dt
 
 
-@njit(cache=True)
-def late(theta, of_filter, covariance, stated):
-    """Fill stated (p, p) of theta (p,), given a filter's of that covariance (p, p), which may be `stated` itself."""
-    more = np.empty(len(theta))
+@njit(cache=True, inline="always")
+def late(theta, of_filter, covariance, stated, more):
+    """Fill stated (p, p) of theta (p,), given a filter's of that covariance (p, p), which may be `stated` itself; more
+    (p,) is scratch."""
     for j in range(len(theta)):
         behind, s = of_filter[j] - theta[j], np.sqrt(max(covariance[j, j], 0.0))
         reach = max(s, (abs(behind) + ONE_SIDED * s) / TWO_SIDED)
@@ -134,58 +134,68 @@ def pass_one(whole, shared, gain, psi, h, n, c):
 
 @njit(cache=True)
 def pass_on(whole, shared, gain, gradient, by_errors, n):
-    """S and C, in place, after theta += gain (y - gradient theta); gain (w, q), gradient (q, w), n of `known_of`."""
+    """S and C, in place, after theta += gain (y - gradient theta); gain (w, q), gradient (q, w), n of `known_of`.
+
+    As in `pass_one`, with G for g and V (q, q) for v: S + G D' + D G', D = C + G V / 2.
+    """
     w, q = gain.shape
     bodies = by_errors.shape[2]
-    c, v, pull = np.zeros((w, q)), np.zeros((q, q)), np.zeros((3, bodies, q))
+    room = np.zeros((q, w + q + 3))  # one piece of memory is found sooner than three
+    c, v, pull = room[:, :w], room[:, w : w + q], room[:, w + q :]
     for i in range(q):
         for b in range(bodies):
             h0, h1, h2 = by_errors[0, i, b], by_errors[1, i, b], by_errors[2, i, b]
             if h0 == 0.0 and h1 == 0.0 and h2 == 0.0:
                 continue
-            pull[0, b, i] = h0 * n[b, 0] + h1 * n[b, 1] + h2 * n[b, 2]
-            pull[1, b, i] = h0 * (n[b, 1] + n[b, 6]) + h1 * n[b, 3] + h2 * n[b, 4]
-            pull[2, b, i] = h0 * n[b, 2] + h1 * n[b, 4] + h2 * n[b, 5]
+            z = h0 * n[b, 0] + h1 * n[b, 1] + h2 * n[b, 2]
+            u = h0 * n[b, 1] + h1 * n[b, 3] + h2 * n[b, 4]
+            d = h0 * n[b, 2] + h1 * n[b, 4] + h2 * n[b, 5]
+            for k in range(i + 1):
+                v[i, k] += by_errors[0, k, b] * z + by_errors[1, k, b] * u + by_errors[2, k, b] * d
             for j in range(w):
-                c[j, i] += h0 * shared[0, b, j] + h1 * shared[1, b, j] + h2 * shared[2, b, j]
-    for i in range(q):  # Psi C H' enters v from both sides, once as it is and once through c
-        for k in range(q):
-            total = 0.0
-            for j in range(w):
-                total -= gradient[i, j] * c[j, k]
-            v[i, k] += total
-            v[k, i] += total
-            for b in range(bodies):
-                for kind in range(3):
-                    v[i, k] += by_errors[kind, k, b] * pull[kind, b, i]
-                v[i, k] -= by_errors[1, k, b] * by_errors[0, i, b] * n[b, 6]
+                c[i, j] += h0 * shared[0, b, j] + h1 * shared[1, b, j] + h2 * shared[2, b, j]
+    for i in range(q):  # Psi C' enters V from both sides: once as it is, once with Psi S Psi' taken off
+        for j in range(w):
+            if gradient[i, j] != 0.0:
+                for k in range(i, q):
+                    v[k, i] -= gradient[i, j] * c[k, j]
     for i in range(q):
         for j in range(w):
-            psi = gradient[i, j]
-            if psi == 0.0:
-                continue
-            for b in range(bodies):
-                for kind in range(3):
-                    pull[kind, b, i] -= psi * shared[kind, b, j]
-    for i in range(q):
-        for j in range(w):
-            total = 0.0
-            for k in range(w):
-                total += whole[j, k] * gradient[i, k]
-            c[j, i] -= total
-            for k in range(q):
-                v[k, i] += gradient[k, j] * total
-    for i in range(q):
-        for j in range(w):
-            g = gain[j, i]
-            if g == 0.0:
-                continue
-            for k in range(w):
-                whole[j, k] += g * c[k, i]
-                whole[k, j] += g * c[k, i]
-            for h in range(q):
+            if gradient[i, j] != 0.0:
                 for k in range(w):
-                    whole[j, k] += g * v[i, h] * gain[k, h]
-            for b in range(bodies):
-                for kind in range(3):
-                    shared[kind, b, j] += g * pull[kind, b, i]
+                    c[i, k] -= gradient[i, j] * whole[j, k]
+    for i in range(q):
+        for j in range(w):
+            if gradient[i, j] != 0.0:
+                for k in range(i + 1):
+                    v[i, k] -= gradient[i, j] * c[k, j]
+    for i in range(q):
+        for k in range(i):
+            v[k, i] = v[i, k]
+    for i in range(q):
+        for k in range(q):
+            for j in range(w):
+                c[i, j] += 0.5 * v[i, k] * gain[j, k]
+    for j in range(w):
+        for i in range(q):
+            if gain[j, i] != 0.0:
+                for k in range(w):
+                    whole[j, k] += gain[j, i] * c[i, k]
+                    whole[k, j] += gain[j, i] * c[i, k]
+    for b in range(bodies):
+        if n[b, 0] == 0.0 and n[b, 3] == 0.0 and n[b, 6] == 0.0:  # it has no errors to share
+            continue
+        for i in range(q):
+            h0, h1, h2 = by_errors[0, i, b], by_errors[1, i, b], by_errors[2, i, b]
+            pull[i, 0] = h0 * n[b, 0] + h1 * n[b, 1] + h2 * n[b, 2]
+            pull[i, 1] = h0 * (n[b, 1] + n[b, 6]) + h1 * n[b, 3] + h2 * n[b, 4]
+            pull[i, 2] = h0 * n[b, 2] + h1 * n[b, 4] + h2 * n[b, 5]
+            for j in range(w):
+                if gradient[i, j] != 0.0:
+                    for kind in range(3):
+                        pull[i, kind] -= gradient[i, j] * shared[kind, b, j]
+        for j in range(w):
+            for i in range(q):
+                if gain[j, i] != 0.0:
+                    for kind in range(3):
+                        shared[kind, b, j] += gain[j, i] * pull[i, kind]

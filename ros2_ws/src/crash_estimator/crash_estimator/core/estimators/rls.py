@@ -61,7 +61,7 @@ class RlsState(NamedTuple):
     errors: tuple[np.ndarray, ...]  # and their errors
     influence: tuple[np.ndarray, ...]  # B_i of each, (p, q)
     variances: tuple[np.ndarray, ...]  # r_i of each, (q,)
-    beside: Consequence | None = None  # what the errors of the motion have made of theta
+    beside: Consequence | None = None  # what the errors of the motion have made of theta, where no filter counts it
     lag: Walking = None  # the filter beside it
 
 
@@ -187,7 +187,7 @@ class Rls:
             gamma=gamma,
             carried=lessen @ state.carried @ lessen.T,
             influence=tuple(lessen @ part for part in state.influence),
-            beside=state.beside.after(gain, regression.gradient, regression.errors),
+            beside=state.beside if state.lag else state.beside.after(gain, regression.gradient, regression.errors),
         )
         return state, Step(gain, error, clamped)
 
