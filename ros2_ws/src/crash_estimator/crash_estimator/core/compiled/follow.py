@@ -41,11 +41,11 @@ def follow(whole, others, state, times_ns, values, rows):
                     if s.squares[b] > 0.0:  # its zero is estimated
                         w.zero[b] = 0.0
                 known_of(w.zero, w.density, plan.velocity_variance, time, w.errors)
-            move_on(s, time)
             if method.is_kalman:
+                move_on(s, s.beside_shared, time)
                 kalman_step(plan, method, n, s, row, dt, w)
             else:
-                rls_step(plan, method, s, row, dt, w)
+                rls_step(plan, method, s, row, dt, time, w)
         else:
             w.gradient[:, n.estimated :] = 0.0  # nothing is expected of the zero offsets' errors without an update
             row.innovation_covariance[:, :] = 0.0
@@ -105,8 +105,10 @@ def _report(plan, n, s, row, w):
     for j in range(len(per_unit)):
         k, slot = plan.element[j], plan.slot[j]
         row.force[k] += per_unit[j] * row.parameters[j]
+        if slot < 0 or per_unit[j] == 0.0:
+            continue
         for h in range(len(per_unit)):
-            if slot >= 0 and plan.element[h] == k and plan.slot[h] >= 0:
+            if plan.element[h] == k and plan.slot[h] >= 0:
                 row.force_std[k] += per_unit[j] * row.covariance[slot, plan.slot[h]] * per_unit[h]
     for k in range(len(shift)):
         row.force_std[k] = np.sqrt(max(row.force_std[k], 0.0))

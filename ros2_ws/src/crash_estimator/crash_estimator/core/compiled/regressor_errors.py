@@ -44,16 +44,10 @@ def known_of(zero, density, velocity, t, n):
 
 
 @njit(cache=True, inline="always")
-def move_on(s, time):
+def move_on(s, shared, time):
     """C goes on to the time of this sample, s since the impact: u += z dt, d += u dt + z dt^2 / 2."""
     dt = time - s.beside_time[0]
     s.beside_time[0] = time
-    _moved(s.beside_shared, dt)
-    _moved(s.walking_shared, dt)
-
-
-@njit(cache=True)
-def _moved(shared, dt):
     for b in range(shared.shape[1]):
         for j in range(shared.shape[2]):
             z, u = shared[0, b, j], shared[1, b, j]

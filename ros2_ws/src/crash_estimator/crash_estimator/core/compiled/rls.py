@@ -8,7 +8,7 @@ from numba import njit
 from .factors import product_of
 from .kalman import Filter, Limits, adapt, let_walk, update
 from .linear import invert, multiply
-from .regressor_errors import late, pass_on
+from .regressor_errors import late, move_on, pass_on
 
 
 class Recursion(NamedTuple):
@@ -171,8 +171,8 @@ def excess_of(method, noise, errors):
         mean = 0.0
         for t in range(m):
             if errors[t, i] == errors[t, i]:
-                mean += errors[t, i] / m
-        largest = max(largest, abs(mean) / (method.error_limit * np.sqrt(noise[i] / m)))
+                mean += errors[t, i]
+        largest = max(largest, abs(mean / m) / (method.error_limit * np.sqrt(noise[i] / m)))
     return largest
 
 
@@ -257,7 +257,7 @@ def remember(s, w, dt, error, gain):
 
 
 @njit(cache=True, inline="always")
-def rls_step(plan, method, s, row, dt, w):
+def rls_step(plan, method, s, row, dt, time, w):
     """Correction, rewinds (MRLS), and the slow residual variance that sets the error limits."""
     gradient, learnt, target, clamped, through, gain = w.gradient, w.learnt, w.target, w.clamped, w.through, w.gain
     p, q, m = len(s.theta), len(target), len(s.window_dt)
@@ -279,6 +279,7 @@ def rls_step(plan, method, s, row, dt, w):
                 total += through[i, j] * gradient[k, j]
             row.innovation_covariance[i, k] = row.innovation_covariance[k, i] = total
     error, walks = w.error, plan.drift_squared.max() > 0.0
+    move_on(s, s.walking_shared if walks else s.beside_shared, time)
     correct(
         limits, method, walks, recursion_of(s), gradient, w.by_errors, w.errors, target, w.active, learnt, dt, 1.0,
         error, clamped, gain,
