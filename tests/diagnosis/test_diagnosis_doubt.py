@@ -36,7 +36,7 @@ def test_a_right_model_is_not_doubted_whether_or_not_an_effect_is_missing(bag, m
 def test_a_model_that_explains_little_and_is_not_mended_is_doubted_below_the_verdict(monkeypatch, capsys, tmp_path):
     """A tenth of the mass: the force calls for ten times the acceleration, and no candidate is so large.
 
-    Fitted to both alike, two motions leave as much to the fourth digit: one follows the force a little better.
+    Fitted to both alike, several motions leave as much to the fourth digit: which is found hangs on where a fit begins.
     """
     model = yaml.safe_load(Path(model_path("frontal_single")).read_text())
     model["bodies"]["car"]["mass"] *= 0.1
@@ -48,7 +48,8 @@ def test_a_model_that_explains_little_and_is_not_mended_is_doubted_below_the_ver
     said = capsys.readouterr().out.splitlines()
     assert status.value.code == 0 and said[0].startswith("unexplained")
     text = "the model itself or the recording may be wrong (as given it explains {}): " + ADVICE + " (car 13.3 m/s)"
-    assert said[1] in {text.format(why) for why in ("31% of barrier_fx", "29% of car_ax")} and said[2] == ""
+    motions = ("31% of barrier_fx", "29% of car_ax", "27% of car_ax")
+    assert said[1] in {text.format(why) for why in motions} and said[2] == ""
 
 
 def test_an_element_that_is_written_the_wrong_way_round_is_named(monkeypatch, capsys, tmp_path):

@@ -39,3 +39,15 @@ def test_an_effect_that_the_rest_leaves_noise_without_goes_again(monkeypatch, sp
     assert list(final.additions) == left
     assert [step.candidates[0].addition for step in found] == [*left, "none"]
     assert found[-1].before.additions == final.additions
+
+
+@pytest.mark.parametrize(("without", "left"), [(1001.0, ["friction"]), (999.0, ["mimic", "friction"])])
+def test_an_effect_that_gains_nothing_beside_the_rest_goes_whatever_is_left_without_it(monkeypatch, without, left):
+    """Where it explains but the last of what is no noise, it need not gain as much as where noise is left anyway."""
+    names = ["mimic", "friction"]
+    smaller = model(["friction"], white=False)
+    smaller.fit.evidence = without
+    monkeypatch.setattr(pruning, "_refitted", lambda magnitudes, additions, like: smaller)
+    path = [SelectionStep(model(names[:k], False), [CandidateFit(name, 50.0, "fit")]) for k, name in enumerate(names)]
+    path.append(SelectionStep(model(names), [CandidateFit("none", 0.0, "fit")]))
+    assert list(pruning.without_the_superseded(None, path, model(names), 0)[1].additions) == left

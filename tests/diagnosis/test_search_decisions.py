@@ -45,9 +45,11 @@ CARE = ["slowly", "other_variants", "anew", "profile"]
         (True, False, (), CARE[:3]),
         (True, True, (), []),
         (True, False, ("one",), []),
+        (False, False, ("one",), []),
+        (False, True, ("one",), CARE),
     ],
 )
-def test_where_noise_is_out_of_reach_care_is_taken_with_a_first_effect_only_and_a_profile_where_most_is_explained(
+def test_care_is_taken_within_reach_of_noise_and_with_a_further_effect_or_a_profile_where_most_is_explained(
     monkeypatch, out_of_reach, explains_most, earlier, tried
 ):
     called = []
@@ -105,13 +107,39 @@ def test_the_first_effect_of_a_path_was_followed_where_a_second_was_fitted_besid
 def test_what_was_followed_one_by_one_is_not_followed_again_in_a_pair(monkeypatch):
     tried = []
     monkeypatch.setattr(pair_search, "analyse", lambda fit: SimpleNamespace(mean_square=2.0))
-    monkeypatch.setattr(
-        pair_search, "added", lambda m, r, mod, first, **how: tried.append(first.addition.key) or (m, mod)
-    )
-    monkeypatch.setattr(pair_search, "fit_candidates", lambda *given: [])
+    monkeypatch.setattr(pair_search, "on_trial", lambda m, mod, first: tried.append(first.addition.key) or (m, mod))
+    monkeypatch.setattr(pair_search, "cost_of_noise", lambda records: 0.0)
+    monkeypatch.setattr(pair_search, "fit_candidates", lambda *given, least: [])
     found = [candidate(900.0, ("friction", "a")), candidate(800.0, ("damping", "a"))]
     assert pair_search.two_at_once(MAGNITUDES, {}, model(), found, [], ("friction", "a")) is None
     assert tried == [("damping", "a")]
+
+
+@pytest.mark.parametrize(("of_the_recording", "fitted"), [(True, ["added"]), (False, ["as fitted"])])
+def test_beside_an_error_of_a_channel_a_second_effect_is_tried_on_the_motion_without_it(
+    monkeypatch, of_the_recording, fitted
+):
+    """The measured motion was wrong, and what the crushes reach over."""
+    ways, first = [], candidate(900.0)
+    first.addition.effect = SimpleNamespace(is_of_the_recording=of_the_recording)
+    monkeypatch.setattr(selection_step, "added", lambda m, *given: ways.append("added") or ("mended", model()))
+    monkeypatch.setattr(selection_step, "as_fitted", lambda *given: ways.append("as fitted") or model())
+    magnitudes, _ = selection_step.on_trial(MAGNITUDES, model(), first)
+    assert ways == fitted and magnitudes == ("mended" if of_the_recording else MAGNITUDES)
+
+
+@pytest.mark.parametrize(("removed", "believed"), [((0.1, 0.2), True), ((0.1, 0.14), False)])
+def test_a_further_step_goes_on_only_where_a_candidate_explains_more_than_too_little(monkeypatch, removed, believed):
+    step = SimpleNamespace(leaves_noise=False, before=None, candidates=[candidate(gain) for gain in removed])
+    monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda *given: step)
+    monkeypatch.setattr(forward_selection, "only_screened", lambda *given: "screened")
+    monkeypatch.setattr(forward_selection, "is_rare", lambda addition: False)
+    monkeypatch.setattr(forward_selection, "band_of_steps", lambda steps: None)
+    monkeypatch.setattr(forward_selection, "as_fitted", lambda before, one: one.gain)
+    little = lambda before, gain, band: gain < THRESHOLDS.least_share  # noqa: E731
+    monkeypatch.setattr(forward_selection, "explains_too_little", little)
+    found = forward_selection._next_step(None, {}, model(additions=("one",)), ["the first step"], 0)
+    assert found == (step if believed else "screened")
 
 
 @pytest.mark.parametrize(("white", "asked"), [(False, [{"friction", "gas"}]), (True, [])])
@@ -195,12 +223,13 @@ def test_other_contacts_must_explain_a_share_of_what_is_above_the_noise(monkeypa
         structure="as stated", added=("one",), final=final, cells=36, steps=[SimpleNamespace(before=final)],
         as_recorded=final.fit,
     )  # fmt: skip
-    otherwise = SimpleNamespace(fit=SimpleNamespace(evidence=gain * THRESHOLDS.gain))
+    otherwise = SimpleNamespace(evidence=gain * THRESHOLDS.gain)
     monkeypatch.setattr(assumptions, "measure_magnitudes", lambda *given: None)
     monkeypatch.setattr(assumptions, "in_the_sensors_noise", lambda model, records: model.fit)
     monkeypatch.setattr(assumptions, "_likely", lambda path: ())
     monkeypatch.setattr(assumptions, "moves_otherwise", lambda *given: True)
-    monkeypatch.setattr(assumptions, "fit_model", lambda *given: otherwise)
+    monkeypatch.setattr(assumptions, "make_problem", lambda *given: None)
+    monkeypatch.setattr(assumptions, "fit", lambda problem: otherwise)
     assert np.isfinite(assumptions._promised("other", path, [record])) == promises
 
 
@@ -221,10 +250,12 @@ def test_a_larger_noise_is_that_of_a_candidate_that_gains(monkeypatch):
     assert found.of == 300.0
 
 
-@pytest.mark.parametrize("fitted", [True, False])
-@pytest.mark.parametrize(("changes", "times"), [((1.0, 0.06, 0.06), 3), ((1.0, 0.04, 0.06), 1), ((0.01, 0.04), 1)])
-def test_the_noise_is_taken_larger_until_it_stays_as_it_is(monkeypatch, changes, times, fitted):
-    """However little it changes the first time: until then it was the sensors'. What was only screened still is."""
+@pytest.mark.parametrize(("changes", "gain", "fitted", "times"), [
+    ((1.0, 0.06, 0.06), 500.0, True, 3), ((1.0, 0.04, 0.06), 500.0, True, 1), ((0.01, 0.04), 500.0, True, 1),
+    ((1.0, 0.06, 0.06), 0.9 * THRESHOLDS.gain, True, 1), ((1.0, 0.06, 0.06), 500.0, False, 1),
+])  # fmt: skip
+def test_the_noise_is_taken_larger_until_it_stays_as_it_is(monkeypatch, changes, gain, fitted, times):
+    """However little it changes the first time: until then it was the sensors'. Once, where nothing counts in it."""
     quietness, larger, ways = 0.0, [], []
 
     def louder(step, records):
@@ -243,8 +274,9 @@ def test_the_noise_is_taken_larger_until_it_stays_as_it_is(monkeypatch, changes,
     monkeypatch.setattr(selection_step, "_noise_left_by", louder)
     monkeypatch.setattr(selection_step, "fit_model", refitted)
     monkeypatch.setattr(selection_step, "better", lambda one, other: False)
-    monkeypatch.setattr(selection_step, "fit_candidates", lambda *given, in_other_noise: ways.append("fitted") or [])
-    monkeypatch.setattr(selection_step, "screen_candidates", lambda *given: ways.append("screened") or [])
+    found = [candidate(gain, fitted=fitted)]
+    monkeypatch.setattr(selection_step, "fit_candidates", lambda *given, in_other_noise: ways.append("fitted") or found)
+    monkeypatch.setattr(selection_step, "screen_candidates", lambda *given: ways.append("screened") or found)
     monkeypatch.setattr(selection_step, "band_of_steps", lambda steps: None)
     monkeypatch.setattr(selection_step, "evenly_fitted", lambda *given: None)
     selection_step.weighed(None, {}, selection_step.SelectionStep(model(), [candidate(500.0, fitted=fitted)]))

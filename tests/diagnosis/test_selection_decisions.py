@@ -102,7 +102,7 @@ def test_an_effect_on_two_elements_is_tried_on_both(monkeypatch, together, pairs
     """Neither explains enough alone; what the second one adds to the first must count for a pair."""
     given = model(100.0)
     one, other = (step(given).candidates[0] for _ in range(2))
-    monkeypatch.setattr(pair_search, "added", lambda *given, on_trial: (None, model(50.0, 1)))
+    monkeypatch.setattr(pair_search, "as_fitted", lambda *given: model(50.0, 1))
     monkeypatch.setattr(pair_search, "fit_model", lambda *given: model(1.0, 2, evidence=together))
     found = pair_search.two_of_one_effect(SimpleNamespace(), given, [one, other])
     assert len(found) == pairs
@@ -146,7 +146,13 @@ def test_what_explains_too_little_is_not_added_and_nothing_after_it(monkeypatch)
 
 
 def one_by_one(
-    monkeypatch, left: float, search, rare: bool = False, little=lambda *given: False, noise_with: int = 9
+    monkeypatch,
+    left: float,
+    search,
+    rare: bool = False,
+    little=lambda *given: False,
+    noise_with: int = 9,
+    hopeless=lambda *given: False,
 ) -> tuple[list, SimpleNamespace]:
     """Each addition takes a tenth of the mean square away; left: of it at first, search: what is found beside a model,
     noise_with: additions with which a candidate leaves noise."""
@@ -156,14 +162,15 @@ def one_by_one(
     monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda m, e, before, path: search(before))
     monkeypatch.setattr(forward_selection, "only_screened", lambda m, e, before: SelectionStep(before, []))
     monkeypatch.setattr(SelectionStep, "leaves_noise", property(white))
-    monkeypatch.setattr(SelectionStep, "with_best", None)
+    monkeypatch.setattr(forward_selection, "as_fitted", lambda before, found: None)
+    monkeypatch.setattr(forward_selection, "_all_explain_too_little", hopeless)
     monkeypatch.setattr(forward_selection, "with_rare_ones", lambda m, e, first: first)
     monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done, path, evenly: done)
     monkeypatch.setattr(forward_selection, "_without", lambda model, found: model)
     monkeypatch.setattr(
         forward_selection,
         "added",
-        lambda m, r, before, best: (m, model(0.9 * (before.residuals.mean_square), len(before.additions) + 1)),
+        lambda m, before, best: (m, model(0.9 * (before.residuals.mean_square), len(before.additions) + 1)),
     )
     monkeypatch.setattr(forward_selection, "band_of_steps", lambda path: None)
     monkeypatch.setattr(forward_selection, "evenly_fitted", lambda *given: "with it")

@@ -39,6 +39,11 @@ def cost_of_nothing(records: Sequence[ObservedRecord]) -> float:
     return sum(float(np.nansum((record.measured / record.noise) ** 2)) for record in records)
 
 
+def cost_of_noise(records: Sequence[ObservedRecord]) -> float:
+    """Of a fit that leaves only that, as expected: the number of values that are fitted."""
+    return float(sum(record.bins * record.measured.shape[1] for record in records))
+
+
 def mean_square_of_nothing(records: Sequence[ObservedRecord]) -> float:
     """Of predicting zero, as of `Residuals`, in units of the noise."""
     return cost_of_nothing(records) / sum(np.count_nonzero(np.isfinite(record.measured)) for record in records)

@@ -20,7 +20,7 @@ from ..parameterization.model_terms import additions_of
 from ..residuals.residuals import Residuals, analyse
 from ..residuals.score_test import drift_of
 from ..residuals.vibration import vibrates_from
-from .acceptance import share_removed
+from .acceptance import cost_of_noise, share_removed
 from .contacts import all_when_spent, elastic_when_spent, moves_otherwise, never_pulling
 from .fitted_model import Model, fit_given, fit_model
 from .forward_selection import first_step, forward_selection
@@ -137,7 +137,6 @@ def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedR
     if other == path.structure or (not path.added and final.white):
         return -np.inf
     magnitudes = measure_magnitudes(other, records, path.cells)
-    samples = sum(record.bins * record.measured.shape[1] for record in records)
     models = [step.before for step in path.steps]
     models = models if models[-1] is final else [*models, final]
     found = ((model.additions, in_the_sensors_noise(model, records)) for model in models)
@@ -145,8 +144,8 @@ def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedR
     for additions, as_recorded in chain(found, _likely(path)):
         if not moves_otherwise(as_recorded, other):
             continue
-        otherwise = fit_model(magnitudes, records, additions).fit
-        misfit = 0.5 * max(as_recorded.cost - samples, 0.0)  # nats
+        otherwise = fit(make_problem(magnitudes, records, additions))
+        misfit = 0.5 * max(as_recorded.cost - cost_of_noise(records), 0.0)  # nats
         if otherwise.evidence > as_recorded.evidence + THRESHOLDS.gain + THRESHOLDS.least_share * misfit:
             most = max(most, otherwise.evidence)
     return most if not final.white or most > path.as_recorded.evidence else -np.inf

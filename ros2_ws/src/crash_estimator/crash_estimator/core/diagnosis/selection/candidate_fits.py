@@ -13,6 +13,7 @@ from ..output_error.problem import OutputErrorProblem, Point, make_problem
 from ..output_error.profile_likelihood import closer, profile
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
+from .acceptance import cost_of_noise
 from .candidates import candidates
 from .fitted_model import Model
 from .score_screening import Screened, screen, shortlist
@@ -44,7 +45,8 @@ def fit_candidates(
 
     thorough: fit the best of them harder, where none of the most likely ones leaves white noise. in_other_noise: what
     was found with other noise, best first; its best fits are gone on from. earlier: what was found for the models
-    before this one. least: cost that another explanation leaves; what stays far above it is not fitted to the end.
+    before this one: beside what was found, only what explains most is fitted harder. least: cost that another
+    explanation leaves; what stays far above it is not fitted to the end.
     """
     additions = candidates(magnitudes, effects, model.additions)
     given = magnitudes, model.records, model.additions, additions, model.roughness
@@ -73,9 +75,10 @@ def fit_candidates(
             if search.reached_the_floor():
                 search.rival_with_care()
                 break
-            if search.out_of_reach() and (earlier or search.explains_most()):
-                break
-            if harder == search.profile and not search.explains_most():
+            if search.explains_most():
+                if search.out_of_reach():
+                    break
+            elif earlier or harder == search.profile:
                 break
             harder()
     return search.ranking()
@@ -207,8 +210,7 @@ class _Search:
 
     def out_of_reach(self) -> bool:
         """What is left is so much more than noise that nothing makes noise of it."""
-        samples = sum(record.bins * record.measured.shape[1] for record in self.model.records)
-        return self.least > THRESHOLDS.out_of_reach * samples
+        return self.least > THRESHOLDS.out_of_reach * cost_of_noise(self.model.records)
 
     def ranking(self) -> list[CandidateFit]:
         """Fitted ones first: a screened gain is an estimate, and does not rank above a fit that has gained anything."""

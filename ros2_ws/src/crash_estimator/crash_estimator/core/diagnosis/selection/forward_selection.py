@@ -12,7 +12,7 @@ from .fitted_model import Model
 from .pair_search import Pair, as_expected, near_the_floor, two_at_once, two_of_one_effect
 from .pruning import up_to_the_least_error, without_the_superseded
 from .rare_effects import common_effects, is_rare, with_rare_ones
-from .selection_step import SelectionStep, added, band_of_steps, in_recorded_noise, only_screened, weighed
+from .selection_step import SelectionStep, added, as_fitted, band_of_steps, in_recorded_noise, only_screened, weighed
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
 
@@ -77,8 +77,8 @@ def _one_by_one(
         if done.best is None or done.best.gain < needed or len(path) > THRESHOLDS.few:
             # where the noise had to be taken larger, the model before the step is the one fitted with it
             return without_the_superseded(magnitudes, path, done.before, present)
-        magnitudes, larger = added(magnitudes, model.records, model, done.best)
-        evenly = None if larger.white else evenly_fitted(done.with_best, band_of_steps(path), larger)
+        magnitudes, larger = added(magnitudes, model, done.best)
+        evenly = None if larger.white else evenly_fitted(as_fitted(done.before, done.best), band_of_steps(path), larger)
         if evenly and explains_too_little(done.sized, evenly, band_of_steps(path)):
             return path, done.before
         model = larger
@@ -101,15 +101,23 @@ def _next_step(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: Sequence[SelectionStep], present: int
 ) -> SelectionStep:
     """All candidates for one more addition; only screened where none would be believed beside those found: beside a
-    rare one none is, and beyond two only one that leaves noise."""
+    rare one none is, beyond two only one that leaves noise, nor one that removes next to nothing, but of what a real
+    structure leaves, where the sensors' noise counts for little."""
     found = model.additions[present:]
     as_many = len(found) >= THRESHOLDS.most_at_once
     far_from_noise = model.residuals.mean_square >= THRESHOLDS.real_structure
     if not (any(map(is_rare, found)) or (as_many and far_from_noise)):
         step = in_recorded_noise(magnitudes, effects, model, path)
-        if step.leaves_noise or not as_many:
+        in_vain = as_many or (found and not far_from_noise and _all_explain_too_little(step, path))
+        if step.leaves_noise or not in_vain:
             return step
     return only_screened(magnitudes, effects, model)
+
+
+def _all_explain_too_little(step: SelectionStep, path: Sequence[SelectionStep]) -> bool:
+    before, band = step.before, band_of_steps([*path, step])
+    fitted = (as_fitted(before, one) for one in step.candidates if one.fit)
+    return all(explains_too_little(before, larger, band) for larger in fitted)
 
 
 def _without(model: Model, found: CandidateFit) -> Model:

@@ -7,10 +7,10 @@ from typing import NamedTuple
 from ...effects.effect import Addition, Effect
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
-from .acceptance import share_removed
+from .acceptance import cost_of_noise, share_removed
 from .candidate_fits import CandidateFit, fit_candidates
 from .fitted_model import Model, fit_model
-from .selection_step import SelectionStep, added
+from .selection_step import SelectionStep, added, as_fitted, on_trial
 from .thresholds import THRESHOLDS
 
 
@@ -48,7 +48,7 @@ def two_of_one_effect(magnitudes: Magnitudes, model: Model, candidates: Sequence
     several = [places for places in alike.values() if len(places) > 1 and _likely(places[:1])]
     found = []
     for first, *others in several[: THRESHOLDS.shortlist]:
-        larger = added(magnitudes, model.records, model, first, on_trial=True)[1]
+        larger = as_fitted(model, first)
         pairs = (_together(magnitudes, candidates, model, first, larger, o.addition) for o in others)
         found += [pair for pair in islice(pairs, THRESHOLDS.few) if pair]
     return found
@@ -64,7 +64,7 @@ def as_expected(
     first = next((one for one in _likely(candidates) if one.addition.key == expected[0].key), None)
     if first is None:
         return None
-    larger = added(magnitudes, model.records, model, first)[1]
+    larger = added(magnitudes, model, first)[1]
     pair = _together(magnitudes, candidates, model, first, larger, expected[1])
     return near_the_floor([pair], candidates) if pair else None
 
@@ -103,15 +103,15 @@ def _likely(candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
 
 def _one_after_the_other(magnitudes: Magnitudes, effects, model: Model, candidates, followed) -> Iterator[Pair]:
     """The likeliest first ones, each with the best second one."""
-    records = model.records
     for first in _likely(candidates)[: THRESHOLDS.few]:
         if first.addition.key == followed or analyse(first.fit).mean_square >= THRESHOLDS.real_structure:
             continue
-        wider, larger = added(magnitudes, records, model, first, on_trial=True)
-        seconds = fit_candidates(wider, effects, larger)
-        if not seconds or not seconds[0].fit or seconds[0].gain < THRESHOLDS.gain_in_pair:
+        wider, larger = on_trial(magnitudes, model, first)
+        seconds = fit_candidates(wider, effects, larger, least=cost_of_noise(model.records))
+        best = next(iter(_likely(seconds)), None)
+        if best is None:
             continue
-        widest, both = added(wider, records, larger, seconds[0])
+        widest, both = added(wider, larger, best)
         if both.white:
             others = [one for one in candidates if one is not first]
             yield Pair(widest, both, [SelectionStep(model, [first, *others]), SelectionStep(larger, seconds)])

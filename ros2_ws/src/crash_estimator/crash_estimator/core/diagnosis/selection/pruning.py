@@ -17,12 +17,15 @@ from .thresholds import THRESHOLDS
 def without_the_superseded(
     magnitudes: Magnitudes, path: list[SelectionStep], final: Model, present: int
 ) -> tuple[list[SelectionStep], Model]:
-    """An effect added first may have stood for one that was found later: what the evidence can spare goes again."""
+    """An effect added first may have stood for one that was found later: what the evidence can spare goes again.
+
+    That is one of which noise is left without it, too, and which gains no more than chance; or which gains nothing.
+    """
     number = present
     while final.white and number < len(final.additions) - 1:
         fewer = final.additions[:number] + final.additions[number + 1 :]
         smaller = _refitted(magnitudes, fewer, final)
-        if not smaller.white or smaller.fit.evidence < final.fit.evidence - THRESHOLDS.gain:
+        if final.fit.evidence - smaller.fit.evidence > (THRESHOLDS.gain if smaller.white else 0.0):
             number += 1
             continue
         path = path[: number - present] + path[number - present + 1 :]

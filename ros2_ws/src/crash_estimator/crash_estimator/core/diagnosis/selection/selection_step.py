@@ -9,10 +9,9 @@ import numpy as np
 from ...effects.effect import Addition, Effect
 from ..observation.noise_inflation import with_inflated_noise
 from ..observation.record import ObservedRecord
-from ..output_error.continuation import FROM_SIMULATION, LARGE_NOISE, SMALL_STEPS
+from ..output_error.continuation import FROM_SIMULATION
 from ..output_error.gauss_newton import Fit, fit
 from ..output_error.normal_equations import may_diverge
-from ..output_error.problem import Point
 from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
 from ..residuals.in_band import band_of
 from ..residuals.residuals import analyse
@@ -41,12 +40,6 @@ class SelectionStep(NamedTuple):
     def best(self) -> CandidateFit | None:
         first = self.candidates[0] if self.candidates else None
         return first if first and first.fit and first.gain > THRESHOLDS.gain else None
-
-    @property
-    def with_best(self) -> Model:
-        """The model with the best candidate, in the same noise."""
-        found = self.candidates[0]
-        return Model((*self.before.additions, found.addition), found.fit, analyse(found.fit), self.before.roughness)
 
     @property
     def leaves_noise(self) -> bool:
@@ -86,10 +79,11 @@ def weighed(
         return done
     fits = {one.addition.key for one in found if one.fit}
     for _ in range(THRESHOLDS.few):
-        if out_of_time():
+        larger = done.before is not model
+        if out_of_time() or (larger and done.best is None):  # nothing counts: in a larger noise yet, still less does
             break
         noisier = _noise_left_by(done, model.records)
-        if done.before is not model and _as_loud(noisier, done.before.records):
+        if larger and _as_loud(noisier, done.before.records):
             break
         before = fit_model(magnitudes, noisier, model.additions)
         problem = before.fit.problem
@@ -139,27 +133,30 @@ def bounded(residuals: Sequence[np.ndarray], records: Sequence[ObservedRecord]) 
     return [r if np.nanstd(r) < np.nanstd(measured) else measured for r, measured in pairs]
 
 
-def added(
-    magnitudes: Magnitudes, records: Sequence[ObservedRecord], model: Model, best: CandidateFit, on_trial: bool = False
-) -> tuple[Magnitudes, Model]:
-    """The model with a candidate that was fitted, on records, and the magnitudes that it then has.
-
-    on_trial: it is only to be seen what a second one gains beside it.
-    """
-    additions = [*model.additions, as_found(best)]
-
-    def fitted(magnitudes: Magnitudes, start: Point | None) -> tuple[Magnitudes, Model]:
-        larger = fit_model(magnitudes, records, additions, start)
-        return magnitudes, larger if larger.white or on_trial else larger.best_of((SMALL_STEPS, LARGE_NOISE))
-
+def added(magnitudes: Magnitudes, model: Model, best: CandidateFit) -> tuple[Magnitudes, Model]:
+    """The model with a candidate that was fitted, and the magnitudes that it then has."""
+    records, additions = model.records, [*model.additions, as_found(best)]
     if not best.addition.effect.is_of_the_recording:
-        return fitted(magnitudes, best.fit.point)
+        return magnitudes, fit_model(magnitudes, records, additions, best.fit.point)
     # the measured motion was wrong, and with it the crushes that the curves reach over
     mended = measure_magnitudes(magnitudes.structure, records, magnitudes.cells, best.fit.trajectories)
-    anew = fitted(mended, None)
-    if anew[1].white:
-        return anew
-    return min(anew, fitted(magnitudes, best.fit.point), key=lambda one: one[1].residuals.mean_square)
+    anew = fit_model(mended, records, additions)
+    if anew.white:
+        return mended, anew
+    on = fit_model(magnitudes, records, additions, best.fit.point)
+    return min((mended, anew), (magnitudes, on), key=lambda one: one[1].residuals.mean_square)
+
+
+def on_trial(magnitudes: Magnitudes, model: Model, first: CandidateFit) -> tuple[Magnitudes, Model]:
+    """With less care than `added`, to see what a second one gains beside it."""
+    if first.addition.effect.is_of_the_recording:
+        return added(magnitudes, model, first)
+    return magnitudes, as_fitted(model, first)
+
+
+def as_fitted(model: Model, found: CandidateFit) -> Model:
+    """The model with a candidate as that was fitted to weigh it: not `added` with all care."""
+    return Model((*model.additions, as_found(found)), found.fit, analyse(found.fit), model.roughness)
 
 
 def as_found(found: CandidateFit) -> Addition:
