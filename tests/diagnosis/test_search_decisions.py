@@ -4,34 +4,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers_made_up_fits import candidate, model
 
 from crash_estimator.core.diagnosis import THRESHOLDS
 from crash_estimator.core.diagnosis.online import candidate_turns
 from crash_estimator.core.diagnosis.online.candidate_turns import OnlineState
-from crash_estimator.core.diagnosis.selection import (
-    assumptions,
-    candidate_fits,
-    forward_selection,
-    pair_search,
-    selection_step,
-)
+from crash_estimator.core.diagnosis.selection import candidate_fits, forward_selection, pair_search, selection_step
 from crash_estimator.core.diagnosis.selection.acceptance import needed_share
-from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.effects.effect import Addition
 
 MAGNITUDES = SimpleNamespace(structure=None)
-
-
-def model(white=False, cost=1000.0, mean_square=50.0, evidence=0.0, additions=()):
-    fit = SimpleNamespace(cost=cost, evidence=evidence, layout=None, point=None)
-    residuals = SimpleNamespace(mean_square=mean_square)
-    return SimpleNamespace(fit=fit, white=white, residuals=residuals, additions=additions, records=(), roughness=None)
-
-
-def candidate(gain, key=("friction", "spring"), fitted=True):
-    fit = SimpleNamespace(evidence=gain, layout=None, point=None)
-    return CandidateFit(SimpleNamespace(key=key), gain, fit if fitted else None)
 
 
 CARE = ["slowly", "other_variants", "anew", "profile"]
@@ -165,72 +148,6 @@ def test_a_search_out_of_time_has_looked_at_all_candidates_once(monkeypatch):
     monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final, present: (path, final))
     path, _ = forward_selection._one_by_one(MAGNITUDES, {}, model(), [], 0)
     assert path == [step]
-
-
-def test_what_other_contacts_promise_of_a_path_is_worked_out_once(monkeypatch):
-    asked = []
-    with_contacts(monkeypatch, {"b": 3.0}, ends_early=True)
-    monkeypatch.setattr(assumptions, "_promised", lambda other, *given: asked.append(other) or 3.0 * (other == "b"))
-    assumptions._selected("stated", (), {})
-    assert asked[:3] == ["a", "b", "c"] and asked.count("b") == 1
-
-
-@pytest.mark.parametrize(("promised", "tried"), [({}, []), ({"b": 3.0}, ["b"]), ({"a": 2.0, "c": 3.0}, ["c", "a"])])
-def test_contacts_are_assumed_otherwise_as_long_as_that_promises_anything(monkeypatch, promised, tried):
-    searched = with_contacts(monkeypatch, promised)
-    assert assumptions._selected("stated", (), {}).final.white is False
-    assert searched == ["stated", *tried]
-
-
-@pytest.mark.parametrize("noise_under", ["b", "none"])
-def test_where_other_contacts_promise_more_than_a_first_step_only_they_are_searched_to_the_end(
-    monkeypatch, noise_under
-):
-    searched = with_contacts(monkeypatch, {"b": 3.0}, noise_under, ends_early=True)
-    found = assumptions._selected("stated", (), {})
-    assert searched == ["stated", "b"]
-    assert found.whole and found.final.white == (noise_under == "b")
-
-
-def with_contacts(monkeypatch, promised, noise_under="none", ends_early=False) -> list[str]:
-    """Contacts a, b and c that promise something (nats) and leave noise or not -> where all is looked for, in turn."""
-    searched = []
-
-    def search(structure, records, effects, expected=(), elsewhere=lambda path: False):
-        searched.append(structure)
-        final = model(white=structure == noise_under)
-        path = assumptions.SelectionPath(structure, [], final, 0, final.fit, (), 36)
-        begun = path._replace(whole=False)
-        return begun if ends_early and elsewhere(begun) else path
-
-    for name, short in (("never_pulling", "a"), ("elastic_when_spent", "b"), ("all_when_spent", "c")):
-        monkeypatch.setattr(assumptions, name, lambda structure, short=short: short)
-    monkeypatch.setattr(assumptions, "_promised", lambda other, *given: promised.get(other, -np.inf))
-    monkeypatch.setattr(assumptions, "out_of_time", lambda: False)
-    monkeypatch.setattr(assumptions, "_as_exact_as_needed", search)
-    return searched
-
-
-@pytest.mark.parametrize(("gain", "cost", "promises"), [
-    (0.9, 1000.0, False),  # less than any candidate must gain
-    (1.1, 1000.0, True),
-    (1.1, 200_000.0, False),  # nothing beside what is left above the noise of a thousand samples
-])  # fmt: skip
-def test_other_contacts_must_explain_a_share_of_what_is_above_the_noise(monkeypatch, gain, cost, promises):
-    final = model(cost=cost, additions=("one",))
-    record = SimpleNamespace(bins=500, measured=np.zeros((1, 2)))
-    path = SimpleNamespace(
-        structure="as stated", added=("one",), final=final, cells=36, steps=[SimpleNamespace(before=final)],
-        as_recorded=final.fit,
-    )  # fmt: skip
-    otherwise = SimpleNamespace(evidence=gain * THRESHOLDS.gain)
-    monkeypatch.setattr(assumptions, "measure_magnitudes", lambda *given: None)
-    monkeypatch.setattr(assumptions, "in_the_sensors_noise", lambda model, records: model.fit)
-    monkeypatch.setattr(assumptions, "_likely", lambda path: ())
-    monkeypatch.setattr(assumptions, "moves_otherwise", lambda *given: True)
-    monkeypatch.setattr(assumptions, "make_problem", lambda *given: None)
-    monkeypatch.setattr(assumptions, "fit", lambda problem: otherwise)
-    assert np.isfinite(assumptions._promised("other", path, [record])) == promises
 
 
 def test_a_larger_noise_is_that_of_a_candidate_that_gains(monkeypatch):
