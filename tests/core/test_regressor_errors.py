@@ -8,7 +8,7 @@ from helpers_estimation import plain
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.benchmarks.coverage import LIMIT, looks, model_for, recorded, rows, simulated
-from crash_estimator.core.compiled.regressor_errors import known_of
+from crash_estimator.core.compiled.regressor_errors import known_of, pass_on
 from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.core.regressor_errors import Consequence, MotionErrors, none_yet
@@ -45,6 +45,21 @@ def test_the_compiled_form_knows_the_same_of_them():
     for k, (one, other) in enumerate([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]):
         assert_allclose(known[:, k], expected[:, one, other], rtol=1e-12)
     assert_array_equal(known[:, 6], VARIANCES[1])
+
+
+def test_the_compiled_form_makes_the_same_of_theta():
+    """With equations that are a body's own, and with parameters that are held or that an equation does not see."""
+    rng, known, found = np.random.default_rng(3), np.empty((B, 7)), none_yet(P, B)._replace(time=0.05)
+    plain(known_of)(*VARIANCES, 0.05, known)
+    whole, shared = np.zeros((P, P)), np.zeros((3, B, P))
+    for _ in range(6):
+        gain, gradient = rng.standard_normal((P, Q)) * 0.3, rng.standard_normal((Q, P))
+        gain[rng.integers(P)], gradient[rng.integers(Q), rng.integers(P)] = 0.0, 0.0
+        h = rng.standard_normal((Q, B, 3))
+        found = found.after(gain, gradient, errors_at(0.05, h))
+        plain(pass_on)(whole, shared, gain, gradient, np.ascontiguousarray(h.transpose(2, 0, 1)), known)
+        assert_allclose(whole, found.covariance, rtol=1e-9, atol=1e-12)
+        assert_allclose(shared.transpose(2, 1, 0), found.shared, rtol=1e-9, atol=1e-12)
 
 
 def test_what_they_make_of_theta_is_the_joint_covariance_of_both_for_any_gains():
