@@ -44,6 +44,17 @@ def test_a_rare_effect_is_named_or_a_rival_that_cannot_be_told_from_it(structure
     assert abs(ours.coefficient - hidden.coefficient) < 4.0 * ours.std
 
 
+@pytest.mark.parametrize(
+    ("structure", "common", "rare"),
+    [("impactor", "unmodelled_body", "gas_cushion"), ("single", "constant_force", "gas_cushion")],
+)
+def test_a_rare_effect_is_named_beside_a_common_one(structure, common, rare):
+    model, recordings, hidden = case(structure, common, rare)
+    found = diagnose(model, recordings)
+    assert (found.verdict, found.complete) == ("effect_missing", True), found.text
+    assert {(step.effect, step.target) for step in found.steps} == {(one.effect, one.target) for one in hidden}
+
+
 @pytest.mark.parametrize("effect", ["viscous_damping", "cubic_stiffness"])
 def test_a_common_effect_stays_named(effect):
     model, recordings, _ = case("impactor", effect)

@@ -131,12 +131,28 @@ def test_beside_noise_a_first_effect_must_stand_out_from_none_and_a_second_one_m
     assert len(final.additions) == len(path) - 1 == added
 
 
-@pytest.mark.parametrize(("left", "rare", "fits"), [(10000.0, False, 2), (50.0, False, 3), (2.0, True, 1)])
+@pytest.mark.parametrize(
+    ("left", "rare", "fits"), [(10000.0, False, 2), (50.0, False, 3), (10000.0, True, 1), (50.0, True, 2)]
+)
 def test_what_would_not_be_believed_is_not_fitted(monkeypatch, left, rare, fits):
-    """Far from noise beyond two, and beside a rare effect: what is left is looked at, and no candidate fitted to it."""
+    """Far from noise beyond two or beside a rare effect: what is left is looked at, and no candidate fitted to it."""
     asked = []
     path, _ = one_by_one(monkeypatch, left, lambda before: asked.append(before) or step(before), rare=rare)
     assert len(asked) == fits and path[-1].candidates == []
+
+
+@pytest.mark.parametrize("noise_with", [2, 3])
+def test_beside_a_rare_effect_only_one_that_leaves_noise_is_added(monkeypatch, noise_with):
+    _, final = one_by_one(monkeypatch, 50.0, step, noise_with=noise_with, rare=True)
+    assert (len(final.additions) > 1) == (noise_with == 2)
+
+
+@pytest.mark.parametrize(("rare", "beside"), [(False, [0, 1]), (True, [0])])
+def test_a_rare_effect_is_asked_for_alone_and_beside_a_common_one(monkeypatch, rare, beside):
+    asked = []
+    with_rare_ones = lambda m, e, first: asked.append(len(first.before.additions)) or first  # noqa: E731
+    one_by_one(monkeypatch, 50.0, step, rare=rare, with_rare_ones=with_rare_ones)
+    assert asked == beside
 
 
 def test_what_explains_too_little_is_not_added_and_nothing_after_it(monkeypatch):
@@ -153,6 +169,7 @@ def one_by_one(
     little=lambda *given: False,
     noise_with: int = 9,
     hopeless=lambda *given: False,
+    with_rare_ones=lambda m, e, first: first,
 ) -> tuple[list, SimpleNamespace]:
     """Each addition takes a tenth of the mean square away; left: of it at first, search: what is found beside a model,
     noise_with: additions with which a candidate leaves noise."""
@@ -164,7 +181,7 @@ def one_by_one(
     monkeypatch.setattr(SelectionStep, "leaves_noise", property(white))
     monkeypatch.setattr(forward_selection, "as_fitted", lambda before, found: None)
     monkeypatch.setattr(forward_selection, "_all_explain_too_little", hopeless)
-    monkeypatch.setattr(forward_selection, "with_rare_ones", lambda m, e, first: first)
+    monkeypatch.setattr(forward_selection, "with_rare_ones", with_rare_ones)
     monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done, path, evenly: done)
     monkeypatch.setattr(forward_selection, "_without", lambda model, found: model)
     monkeypatch.setattr(

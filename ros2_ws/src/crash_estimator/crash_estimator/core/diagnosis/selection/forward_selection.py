@@ -65,7 +65,8 @@ def _one_by_one(
     while not (path and out_of_time()):
         if first is None:
             first = _next_step(magnitudes, common, model, path, present)
-            first = first if path else with_rare_ones(magnitudes, effects, first)
+            if _takes_a_rare_one(model.additions[present:]):
+                first = with_rare_ones(magnitudes, effects, first)
         done, first = weighed(magnitudes, common, first, path, evenly), None
         path.append(done)
         fair = _without(model, done.best) if done.best and done.before is model else model
@@ -101,17 +102,22 @@ def _next_step(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: Sequence[SelectionStep], present: int
 ) -> SelectionStep:
     """All candidates for one more addition; only screened where none would be believed beside those found: beside a
-    rare one none is, beyond two only one that leaves noise, nor one that removes next to nothing, but of what a real
+    rare one or beyond two only one that leaves noise is, and none that removes next to nothing, but of what a real
     structure leaves, where the sensors' noise counts for little."""
     found = model.additions[present:]
-    as_many = len(found) >= THRESHOLDS.most_at_once
+    only_to_noise = len(found) >= THRESHOLDS.most_at_once or any(map(is_rare, found))
     far_from_noise = model.residuals.mean_square >= THRESHOLDS.real_structure
-    if not (any(map(is_rare, found)) or (as_many and far_from_noise)):
+    if not (only_to_noise and far_from_noise):
         step = in_recorded_noise(magnitudes, effects, model, path)
-        in_vain = as_many or (found and not far_from_noise and _all_explain_too_little(step, path))
+        in_vain = only_to_noise or (found and not far_from_noise and _all_explain_too_little(step, path))
         if step.leaves_noise or not in_vain:
             return step
     return only_screened(magnitudes, effects, model)
+
+
+def _takes_a_rare_one(found: Sequence[Addition]) -> bool:
+    """Whether one may be added to what was found."""
+    return len(found) < THRESHOLDS.most_at_once and not any(map(is_rare, found))
 
 
 def _all_explain_too_little(step: SelectionStep, path: Sequence[SelectionStep]) -> bool:

@@ -1,6 +1,6 @@
-"""Rare effects bend far, and one of them with another beside it would follow most that no vocabulary has: they are
-asked after the common ones, and believed only where one of them alone leaves noise, or next to nothing else where no
-common one comes near; or in a pair, beside a common one, that leaves noise where those one by one do not."""
+"""Rare effects bend far, and two of them would follow most that no vocabulary has: they are asked after the common
+ones, alone or beside one of those, and believed only where what is left is noise, or next to nothing where no common
+one comes near. Beside a rare one that was found another one is added only where noise is left, and no rare one."""
 
 from collections.abc import Iterable, Mapping
 
@@ -36,7 +36,7 @@ def is_rare(addition: Addition) -> bool:
 
 
 def with_rare_ones(magnitudes: Magnitudes, effects: Mapping[str, Effect], step: SelectionStep) -> SelectionStep:
-    """A first step of common effects, with the rare ones in its ranking where one of them is believed.
+    """A step of common effects, with the rare ones in its ranking where one of them is believed.
 
     They are fitted with care where the common ones leave more than noise, and one of them less than the best of those.
     """
