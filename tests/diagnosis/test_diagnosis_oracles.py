@@ -88,7 +88,9 @@ def recording() -> Recording:
 
 EVERY_EFFECT = (
     EffectSpec("viscous_damping", "foam", 200.0),
+    EffectSpec("viscous_damping", "foam", 200.0, {"rebound": 0.3}, variant="uneven"),
     EffectSpec("quadratic_damping", "foam", 60.0),
+    EffectSpec("quadratic_damping", "foam", 60.0, {"rebound": 0.3}, variant="uneven"),
     EffectSpec("coulomb_friction", "mount", 400.0, {"speed": 0.3}),
     EffectSpec("hysteresis", "foam", 1500.0, {"yield_crush": 0.01, "exponent": 2.0}),
     EffectSpec("hysteresis", "foam", 1500.0, {"yield_crush": 0.01, "exponent": 1.5}, variant="dahl"),

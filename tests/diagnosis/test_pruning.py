@@ -41,6 +41,23 @@ def test_an_effect_that_the_rest_leaves_noise_without_goes_again(monkeypatch, sp
     assert found[-1].before.additions == final.additions
 
 
+@pytest.mark.parametrize(("ended", "left"), [(0.0, ["damper"]), (9.0, ["mimic", "damper"])])
+def test_what_has_ended_at_nothing_goes_where_more_than_noise_is_left_too(monkeypatch, ended, left):
+    """A damper on another element, found first, was told as 0 N s/m beside the right one."""
+    mimic, damper = SimpleNamespace(touches=()), SimpleNamespace(touches=())
+    names = {id(mimic): "mimic", id(damper): "damper"}
+    terms = {id(mimic): SimpleNamespace(coefficient=0), id(damper): SimpleNamespace(coefficient=1)}
+    layout = SimpleNamespace(term=lambda addition: terms[id(addition)])
+    fit = SimpleNamespace(evidence=1000.0, layout=layout, theta=[ended, 500.0])
+    final = SimpleNamespace(additions=(mimic, damper), white=False, fit=fit)
+    smaller = SimpleNamespace(additions=(damper,), white=False, fit=SimpleNamespace(evidence=1000.0))
+    monkeypatch.setattr(pruning, "_refitted", lambda magnitudes, additions, like: smaller)
+    path = [SelectionStep(None, [CandidateFit(one, 50.0, "fit")]) for one in (mimic, damper)]
+    path.append(SelectionStep(final, [CandidateFit("none", 0.0, "fit")]))
+    _, model_left = pruning.without_the_superseded(None, path, final, 0)
+    assert [names[id(one)] for one in model_left.additions] == left
+
+
 @pytest.mark.parametrize(("without", "left"), [(1001.0, ["friction"]), (999.0, ["mimic", "friction"])])
 def test_an_effect_that_gains_nothing_beside_the_rest_goes_whatever_is_left_without_it(monkeypatch, without, left):
     """Where it explains but the last of what is no noise, it need not gain as much as where noise is left anyway."""

@@ -5,21 +5,30 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
+from crash_estimator.benchmarks.effects_judge import drawn as drawn_case
+from crash_estimator.benchmarks.effects_plan import case_of
 from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.core.diagnosis.selection import rare_effects, selection_step
 from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
-from crash_estimator.core.diagnosis.selection.rare_effects import common_effects, found_as_common, with_rare_ones
+from crash_estimator.core.diagnosis.selection.rare_effects import (
+    common_effects,
+    found_as_common,
+    is_rare,
+    with_rare_ones,
+)
 from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.effects.effect import Addition
 from crash_estimator.core.structure import EffectSpec
 from crash_estimator.model_file import ModelFile
+from crash_replay.recording import Channel, Recording, Test
 from crash_replay.synthetic.hidden.cases import draw_case
 
 THAT_REMEMBER = {"maxwell_element", "gas_cushion"}
 RARE = THAT_REMEMBER | {"guide_friction", "force_offset"}
-IN_RARE_FORMS = {"rate_hardening", "quadratic_damping"}
+IN_RARE_FORMS = {"rate_hardening", "viscous_damping", "quadratic_damping"}
 SPEEDS = (0.75, 1.1)
 
 
@@ -42,6 +51,31 @@ def test_a_rare_effect_is_named_or_a_rival_that_cannot_be_told_from_it(structure
     assert f"{effect} on {hidden.target}" in told, found.text
     (ours,) = (ranked for ranked in found.ranking if (ranked.effect, ranked.target) == (effect, hidden.target))
     assert abs(ours.coefficient - hidden.coefficient) < 4.0 * ours.std
+
+
+def test_a_spring_that_relaxes_within_two_milliseconds_is_no_damper():
+    """Its time was not looked for below 3 ms: a damper with a gap was told."""
+    drawn = draw_case("impactor", ("maxwell_element",), 3218)
+    found = diagnose(
+        ModelFile.model_validate(dict(drawn.specimen.model)).structure(), [drawn.record(v, 0.5)[0] for v in SPEEDS]
+    )
+    (step,), (hidden,) = found.steps, drawn.hidden
+    assert (found.verdict, step.effect) == ("effect_missing", "maxwell_element"), found.text
+    assert hidden.shape["relaxation_time"] < 2e-3 and abs(step.coefficient - hidden.coefficient) < 4.0 * step.std
+
+
+@pytest.mark.parametrize(
+    ("name", "effect", "other"),
+    [
+        ("single/plastic_unloading/1/2g/10000Hz/1.1/14000888", "plastic_unloading", "hysteresis"),
+        ("side/channel_delay/1/2g/10000Hz/1.1/14000676", "channel_delay", "clearance"),
+    ],
+)
+def test_what_no_screening_sees_is_among_the_rivals(name, effect, other):
+    """The other one alone was told, though both leave noise: a screening takes a coefficient for small."""
+    _, structure, recordings = drawn_case(case_of(name))
+    leader = diagnose(structure, recordings).ranking[0]
+    assert {effect, other} <= {leader.effect, *(rival.split(" on ")[0] for rival in leader.confounded_with)}
 
 
 @pytest.mark.parametrize(
@@ -112,6 +146,59 @@ def test_a_rare_effect_comes_into_the_ranking_where_it_leaves_noise_or_next_to_n
     assert (found is step) == (leads == "friction" and left_by_rare >= 1.1e3)  # what is not believed is not told
     model.records[0].below = 240.0  # in a band alone anything leaves noise
     assert with_rare_ones(magnitudes, EFFECTS, step) is step
+
+
+@pytest.mark.parametrize(("common", "rare", "near"), [(1.66, 1.01, False), (1.66, 1.1, True), (2.1, 1.01, False)])
+def test_a_common_effect_comes_near_a_rare_one_unless_it_leaves_twenty_times_as_much(monkeypatch, common, rare, near):
+    """In units of the noise: of a damper with a valve a usual one leaves 1.66, and its own form 1.01."""
+    for module in (selection_step, rare_effects):
+        monkeypatch.setattr(module, "analyse", left)
+    steps = [SelectionStep(None, [fitted("an effect", cost=1e3 * leaves)]) for leaves in (common, rare)]
+    assert rare_effects._comes_near(*steps) == near
+
+
+def test_of_an_effect_in_several_forms_those_that_are_not_looked_for_first_are_rare():
+    damper, gas, gap = (EFFECTS[name] for name in ("viscous_damping", "gas_cushion", "clearance"))
+    rest = damper.without(damper.common())
+    assert (rest.variants, rest.rare) == (("uneven",), True) and is_rare(Addition(rest, "mount", variant="uneven"))
+    assert gas.without(gas.common()) is gas and gap.without(gap.common()) is None
+    assert damper.without(damper) is None, "where the model has one, all its forms are common"
+
+
+def test_a_damper_that_hardly_pulls_is_told_as_one():
+    """It was told as a gas, whose coefficient meant nothing."""
+    sled = ModelFile.model_validate(
+        {
+            "name": "sled",
+            "bodies": {"sled": {"mass": MASS, "acceleration": "sled_ax"}, "wall": {"fixed": True, "force": "wall_fx"}},
+            "elements": {"buffer": {"between": ["sled", "wall"], "stiffness": SPRING}},
+        }
+    ).structure()
+    found = diagnose(sled, [with_a_valve(speed) for speed in (2.0, 3.0)])
+    (step,) = found.steps
+    assert (found.verdict, found.complete) == ("effect_missing", True), found.text
+    assert (step.effect, step.target, step.form) == ("viscous_damping", "buffer", "uneven"), found.text
+    assert abs(step.coefficient / DAMPER - 1.0) < 0.02 and step.shape["rebound"] < 0.05
+
+
+MASS, DAMPER = 95.0, 300.0  # kg, N s/m
+SPRING = {"estimate": True, "initial": 2e4, "shape": "constant"}
+
+
+def with_a_valve(speed: float) -> Recording:
+    """A sled that swings on a spring of 30 N/mm, beside it a damper that does nothing where it is pulled."""
+
+    def force(state):
+        return 3e4 * state[0] + DAMPER * np.maximum(state[1], 0.0)
+
+    time = np.arange(3000) / 1e4
+    exactly = dict(t_eval=time, rtol=1e-8, max_step=1e-3)
+    way = solve_ivp(lambda t, x: (x[1], -force(x) / MASS), (0.0, 0.3), (0.0, speed), **exactly)
+    noise = np.random.default_rng(7).standard_normal((3300, 2)) * (0.3, 30.0)
+    values = np.vstack([np.zeros((300, 2)), np.column_stack([-force(way.y) / MASS, force(way.y)])]) + noise
+    channels = Channel("sled_ax", "acceleration", "sled", "x"), Channel("wall_fx", "force", "wall", "x")
+    test = Test(f"sled_{speed:g}", channels, initial_velocity={"sled": speed})
+    return Recording(test, (np.arange(-300, 3000) * 100_000).astype(np.int64), values)
 
 
 def test_what_the_model_has_is_common_in_all_its_forms():

@@ -59,6 +59,30 @@ def test_care_is_taken_within_reach_of_noise_and_with_a_further_effect_or_a_prof
     assert candidate_fits.fit_candidates(None, {}, model(), thorough=True, earlier=earlier) == tried
 
 
+@pytest.mark.parametrize(("white", "asked"), [(False, ["hardly screened", "with care"]), (True, ["hardly screened"])])
+def test_rivals_that_a_screening_does_not_see_are_fitted_beside_what_leaves_noise(monkeypatch, white, asked):
+    """And the next one with care, but where the model leaves noise as given."""
+    called = []
+
+    class Search:
+        def __init__(self, *given):
+            pass
+
+        def __getattr__(self, name):
+            return lambda *given: None
+
+        reached_the_floor = staticmethod(lambda: True)
+        hardly_screened = staticmethod(lambda: called.append("hardly screened"))
+        rival_with_care = staticmethod(lambda: called.append("with care"))
+
+    monkeypatch.setattr(candidate_fits, "_Search", Search)
+    monkeypatch.setattr(candidate_fits, "candidates", lambda *given: ())
+    monkeypatch.setattr(candidate_fits, "screen", lambda *given: [])
+    monkeypatch.setattr(candidate_fits, "out_of_time", lambda: False)
+    candidate_fits.fit_candidates(None, {}, model(white=white), thorough=True)
+    assert called == asked
+
+
 @pytest.mark.parametrize(("leaves_noise", "explained", "out_of_time", "looked_for"), [
     (False, 0.9, False, True), (True, 0.9, False, False), (False, 0.96, False, False), (False, 0.9, True, False),
 ])  # fmt: skip
@@ -135,6 +159,18 @@ def test_where_one_by_one_leaves_more_than_noise_pairs_are_tried_rare_effects_am
     monkeypatch.setattr(forward_selection, "two_at_once", lambda m, effects, *given: tried.append(set(effects)))
     path, _ = forward_selection.forward_selection(MAGNITUDES, effects, model(), first)
     assert path == [first] and tried == asked
+
+
+def test_pairs_are_of_the_candidates_for_the_model_as_given_though_a_first_effect_went_again(monkeypatch):
+    """The path then begins with what was fitted beside that one, whose fits are of a larger model."""
+    tried = []
+    first, second = (SimpleNamespace(leaves_noise=True, before=model(), as_recorded=[k]) for k in ("given", "later"))
+    monkeypatch.setattr(forward_selection, "common_effects", lambda structure, every: {})
+    monkeypatch.setattr(forward_selection, "out_of_time", lambda: False)
+    monkeypatch.setattr(forward_selection, "_one_by_one", lambda *given: ([second], model()))
+    monkeypatch.setattr(forward_selection, "two_at_once", lambda m, e, given, *others: tried.append(others[0]))
+    forward_selection.forward_selection(MAGNITUDES, {}, model(), first)
+    assert tried == [["given"]]
 
 
 def test_a_search_out_of_time_has_looked_at_all_candidates_once(monkeypatch):

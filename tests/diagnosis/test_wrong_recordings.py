@@ -92,6 +92,15 @@ def test_what_an_element_to_a_wall_may_carry_is_not_offered_on_the_ground_as_wel
     assert list(EFFECTS["guide_friction"].candidates(held, None)) == []
 
 
+def test_what_a_load_cell_behind_an_element_does_not_show_is_offered_on_the_ground():
+    """It was told as friction in that element, by which the error of the load cell grew."""
+    post = Element("post", ("sled", "frame"), Coefficient(3e5, shape="constant"))
+    magnitudes = SimpleNamespace(shape_unit=lambda shape, element: 1.0)
+    bodies = Body("sled", 95.0, ("sled_ax",)), Body("frame", fixed=True, force="frame_fx")
+    offered = EFFECTS["guide_friction"].candidates(Structure("rig", bodies, (post,)), magnitudes)
+    assert [addition.target for addition in offered] == ["sled"]
+
+
 def test_a_load_cell_s_zero_is_named_and_not_a_force():
     model, recordings = case("wall/nothing/1g/clean/71900000")
     offset = 0.04 * max(float(np.abs(one.column("barrier_fx")).max()) for one in recordings)

@@ -132,6 +132,13 @@ class Effect:
             return None if self.rare else self
         return replace(self, forms=dict(list(self.forms.items())[:1]))
 
+    def without(self, common: "Effect | None") -> "Effect | None":
+        """What of it is looked for last: it in the forms that `common`, what is looked for first, has not; or None."""
+        if common is None or not self.forms:
+            return None if common else self
+        forms = {name: shapes for name, shapes in self.forms.items() if name not in common.forms}
+        return replace(self, forms=forms, rare=True) if forms else None
+
     def as_common(self, variant: str) -> "Effect":
         """The same, with what acts in this variant looked for first."""
         forms = {variant: self.forms[variant]} | dict(self.forms) if self.forms else self.forms

@@ -73,7 +73,6 @@ def fit_candidates(
             if out_of_time():
                 break
             if search.reached_the_floor():
-                search.rival_with_care()
                 break
             if search.explains_most():
                 if search.out_of_reach():
@@ -81,6 +80,10 @@ def fit_candidates(
             elif earlier or harder == search.profile:
                 break
             harder()
+    if thorough and not out_of_time() and search.reached_the_floor():
+        search.hardly_screened()
+        if not model.white:
+            search.rival_with_care()
     return search.ranking()
 
 
@@ -157,6 +160,15 @@ class _Search:
         taken_away = self.model.fit.cost - look.fit.cost
         if taken_away > THRESHOLDS.named_share * (self.model.fit.cost - self.least):
             self._note(look.addition, closer(look))
+
+    def hardly_screened(self) -> None:
+        """Fit what enters no force in proportion, a constant of the law that the best one adds to, or a delay: a
+        screening, which takes it for small, may see nothing of one that explains as much."""
+        best = self.ranking()[0].addition
+        kin = [o for o in self.screened if o.addition.effect.changes_law and o.addition.target == best.target]
+        delays = [o for o in self.screened if o.addition.effect.distorts == "delay"]
+        new = [o for o in [*kin, *delays] if self.found[o.addition.key].fit is None]
+        self.from_motion(shortlist(new, len(new)))
 
     def rival_with_care(self) -> None:
         """Fit another law on the same target that comes near the best one as carefully as that may need: what looks

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from ...effects.effect import Addition
 from ..output_error.continuation import SMALL_STEPS
-from ..output_error.gauss_newton import fit
+from ..output_error.gauss_newton import Fit, fit
 from ..output_error.problem import make_problem
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.in_band import in_band
@@ -20,9 +20,13 @@ def without_the_superseded(
     """An effect added first may have stood for one that was found later: what the evidence can spare goes again.
 
     That is one of which noise is left without it, too, and which gains no more than chance; or which gains nothing.
+    Where more than noise is left anyway, only what has ended at nothing is asked.
     """
     number = present
-    while final.white and number < len(final.additions) - 1:
+    while number < len(final.additions) - 1:
+        if not (final.white or _is_zero(final.additions[number], final.fit)):
+            number += 1
+            continue
         fewer = final.additions[:number] + final.additions[number + 1 :]
         smaller = _refitted(magnitudes, fewer, final)
         if final.fit.evidence - smaller.fit.evidence > (THRESHOLDS.gain if smaller.white else 0.0):
@@ -72,6 +76,9 @@ def up_to_the_least_error(
 
 
 def _is_nothing(step: SelectionStep, final: Model) -> bool:
-    """An addition whose coefficient has ended at zero; beside a body's curve, its mass may."""
-    fitted, addition = fit_stated(step, final), step.candidates[0].addition
+    return _is_zero(step.candidates[0].addition, fit_stated(step, final))
+
+
+def _is_zero(addition: Addition, fitted: Fit) -> bool:
+    """An addition whose coefficient has ended there; beside a body's curve, its mass may."""
     return not addition.touches and fitted.theta[fitted.layout.term(addition).coefficient] == 0.0

@@ -26,7 +26,7 @@ def common_effects(structure: Structure, effects: Mapping[str, Effect]) -> Mappi
 
 def found_as_common(effects: Mapping[str, Effect], found: Iterable[Addition]) -> Mapping[str, Effect]:
     """The effects, with rare ones that were found looked for among the first."""
-    return {**effects} | {one.effect.name: one.effect.as_common(one.variant) for one in found if is_rare(one)}
+    return {**effects} | {o.effect.name: effects[o.effect.name].as_common(o.variant) for o in found if is_rare(o)}
 
 
 def is_rare(addition: Addition) -> bool:
@@ -41,17 +41,19 @@ def with_rare_ones(magnitudes: Magnitudes, effects: Mapping[str, Effect], step: 
     They are fitted with care where the common ones leave more than noise, and one of them less than the best of those.
     """
     common = common_effects(magnitudes.structure, effects)
-    rare = {name: effect for name, effect in effects.items() if effect is not common.get(name)}
+    rest = {name: effect.without(common.get(name)) for name, effect in effects.items()}
+    rare = {name: effect for name, effect in rest.items() if effect}
     model = step.before
     in_a_band = any(np.isfinite(record.below) for record in model.records)
-    if not rare or model.white or in_a_band or out_of_time():
+    nothing_is_missing = model.white and not (step.best and step.best.gain >= THRESHOLDS.confounded)
+    if not rare or nothing_is_missing or in_a_band or out_of_time():
         return step
     least = min([model.fit.cost, *(one.fit.cost for one in step.candidates if one.fit)])
     alone = SelectionStep(model, fit_candidates(magnitudes, rare, model, least=least))
     leaves_less = any(one.fit and one.fit.cost < least for one in alone.candidates)
     if leaves_less and not (step.leaves_noise or alone.leaves_noise):
         alone = SelectionStep(model, fit_candidates(magnitudes, rare, model, thorough=True, least=least))
-    if not (alone.leaves_noise or (_leaves_next_to_nothing(alone) and not _near_the_floor(step))):
+    if not (alone.leaves_noise or (_leaves_next_to_nothing(alone) and not _comes_near(step, alone))):
         return step
     best: dict[tuple[str, str], CandidateFit] = {}
     for one in sorted([*step.candidates, *alone.candidates], key=_rank):
@@ -64,6 +66,14 @@ def _leaves_next_to_nothing(step: SelectionStep) -> bool:
     """The best leaves less than the noise again, of much more: the rest may be the form of its law."""
     near = _near_the_floor(step)
     return near and share_removed(step.before.residuals, analyse(step.best.fit)) > THRESHOLDS.all_but_folds
+
+
+def _comes_near(step: SelectionStep, rare: SelectionStep) -> bool:
+    """A common one leaves less than the noise again as well, and not twenty times as much of it as the rare one."""
+    if not _near_the_floor(step):
+        return False
+    left, by_rare = (analyse(one.best.fit) for one in (step, rare))
+    return share_removed(left, by_rare) < THRESHOLDS.all_but_folds
 
 
 def _near_the_floor(step: SelectionStep) -> bool:

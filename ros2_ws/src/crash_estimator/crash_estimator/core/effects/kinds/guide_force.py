@@ -35,8 +35,9 @@ class GuideForce(ElementForce):
         return OwnLink((index[addition.target], index[GROUND]), tension=True, origin=(), spring=False)
 
     def candidates(self, structure, magnitudes):
-        """On bodies that no element holds to a fixed one both ways: beside that it is a force of its own."""
-        fixed = {body.name for body in structure.bodies if body.fixed}
+        """On bodies that no element holds both ways to a fixed one, as there friction in the element is the same; but
+        where the force on the fixed body is measured, which does not show what the ground takes."""
+        fixed = {body.name for body in structure.bodies if body.fixed and not body.force}
         held = {name for e in structure.elements if e.tension and fixed & set(e.between) for name in e.between}
         for name in self.possible_targets(structure, None):
             if name not in held:
