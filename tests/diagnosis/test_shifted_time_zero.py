@@ -89,10 +89,20 @@ def test_the_right_model_says_when_its_motion_began(structure):
         return [observe(structure, one) for one in moved_by(shifts, case.recordings)]
 
     begins = onsets(case.recordings, as_well=True)
-    found, gain = sharpened(begins, [one._replace(seconds=0.0) for one in begins], structure, [], observed, np.inf)
-    off = [(one.seconds - t) / one.std for one, t in zip(found, true)]
-    assert np.abs(off).max() < 3.0 and max(one.std for one in found) < 2e-4, (found, true)
-    assert gain > 100.0, "nats, over the stated time zeros"
+    found = sharpened(begins, [one._replace(seconds=0.0) for one in begins], structure, [], observed, np.inf)
+    off = [(one.seconds - t) / one.std for one, t in zip(found.shifts, true)]
+    assert np.abs(off).max() < 3.0 and max(one.std for one in found.shifts) < 2e-4, (found.shifts, true)
+    assert found.gain > 100.0, "nats, over the stated time zeros"
+
+
+def test_what_makes_up_for_a_time_zero_that_is_off_is_not_told_beside_it():
+    """The onset is 2 ms late, as the signal begins gently: a gap of 21 mm stood beside it."""
+    case = drawn_of_second(of_second("sled/nothing/0.5g/shifted/71900103"))
+    found = diagnose(ModelFile.model_validate(yaml.safe_load(case.model_text)).structure(), case.recordings)
+    (zero,) = found.steps
+    late = max(1e-9 * recording.time_ns[0] + BEFORE for recording in case.recordings)
+    assert (found.verdict, found.complete, zero.effect) == ("effect_missing", True, "time_zero")
+    assert abs(zero.coefficient - late) < 3e-4
 
 
 @pytest.mark.parametrize(("found_leaves", "sharper_gains"), [(2.0, True), (0.5, False)])
@@ -113,8 +123,22 @@ def test_a_sharper_time_zero_must_leave_less_than_all_that_was_found_without_it(
         return [SimpleNamespace(**vars(record), at=shifts[0].seconds)]
 
     stated = onset._replace(seconds=onset.seconds + 5e-5)
-    _, gain = sharpened([onset], [stated], None, [], observed, found_leaves)
-    assert (gain > 0.0) == sharper_gains
+    found = sharpened([onset], [stated], None, [], observed, found_leaves)
+    assert (found.gain > 0.0) == (found.of_residuals > 0.0) == sharper_gains
+
+
+def test_what_the_onsets_alone_speak_for_is_no_gain_of_what_is_left(monkeypatch):
+    """The model leaves more from the onset on, which is known to 0.1 ms, than from the stated time zero."""
+    onset = Shift(0, "test", 3e-3, 1e-4, 1e-4)
+    monkeypatch.setattr(time_zero, "measure_magnitudes", lambda *given: None)
+    left = lambda m, records, a: SimpleNamespace(residuals=SimpleNamespace(rms=1.0 + 1e3 * records[0].at))  # noqa: E731
+    monkeypatch.setattr(time_zero, "fit_model", left)
+
+    def observed(shifts):
+        return [SimpleNamespace(bins=100, measured=np.zeros((1, 1)), at=shifts[0].seconds)]
+
+    found = sharpened([onset], [onset._replace(seconds=0.0)], None, [], observed, 1.0)
+    assert found.gain > 0.0 > found.of_residuals
 
 
 @pytest.fixture(scope="module")

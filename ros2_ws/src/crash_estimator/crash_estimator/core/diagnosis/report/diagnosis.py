@@ -149,7 +149,9 @@ def _from_a_sharper_time_zero(
 ) -> tuple[SelectionPath, TimeZero | None, tuple[Shift, ...]] | None:  # fmt: skip
     """What is found from where the motion with the first effect that was found begins: where that leaves less than all
     that was found, and then noise, as that does not, or does with more effects. Twice, as what came first may have been
-    found for the time zero."""
+    found for the time zero. One effect beside a time zero may make up for what that is off: what is found from where
+    the motion of the model as given begins, where that leaves as little and lacks nothing.
+    """
     if found.final.white and not (found.added or zero):  # as stated the model lacks nothing
         return None
     begins = onsets(recordings, as_well=True)
@@ -162,19 +164,23 @@ def _from_a_sharper_time_zero(
         return _from(structure, recordings, shifts)
 
     path = found
-    for _ in range(2 if most > 0 else 0):
+    for _ in range(2 if most > 0 else 1 if zero else 0):
         left = analyse(path.as_recorded)
         if left.mean_square >= THRESHOLDS.real_structure or out_of_time():
             return None
-        additions = (*path.final.additions[: path.present], *path.added[:1])
-        shifts, gain = sharpened(begins, shifts, path.structure, additions, observed, left.rms)
-        if not gain > THRESHOLDS.gain:
+        additions = (*path.final.additions[: path.present], *path.added[: min(most, 1)])
+        sharp = sharpened(begins, shifts, path.structure, additions, observed, left.rms)
+        shifts = sharp.shifts
+        if sharp.of_residuals < -THRESHOLDS.gain or (most and not sharp.gain > THRESHOLDS.gain):
             return None
         path = first_believed(select(structure, observed(shifts), effects))
         if path.noise:
             elsewhere = tuple(shift for shift in shifts if abs(shift.seconds) > shift.period)
-            found_so = path, TimeZero(elsewhere, as_stated) if elsewhere else None, ()
-            return found_so if len(path.added) <= most else None
+            moved = TimeZero(elsewhere, as_stated) if elsewhere else None
+            if len(path.added) > most:
+                return None
+            alone = moved and path.added and _from_a_sharper_time_zero(structure, recordings, effects, path, moved)
+            return alone or (path, moved, ())
     return None
 
 
@@ -253,7 +259,7 @@ def _drift_left_by(path: SelectionPath, sized: Model) -> Drift:
 def _explained_by_first_effect(models: Sequence[Model], added: Sequence[Addition], cfc: int | None) -> float:
     """Share of the misfit in the band; what one element lacks another may as well, then the two count as one. Nothing
     of an inertia, a given force or a channel's error: no law of theirs may be written another way."""
-    if not added or added[0].effect.acts_on not in ("element", "between"):
+    if not added or not (added[0].effect.acts_on in ("element", "between") or added[0].effect.on_ground):
         return 0.0
     effects = [addition.effect.name for addition in added]
     alike = next((k for k, effect in enumerate(effects) if effect != effects[0]), len(effects))

@@ -65,6 +65,14 @@ class TimeZero(NamedTuple):
         return float(bins * np.log(self.as_stated.residuals.rms / rms(moved.fit.layout, of_both)))
 
 
+class Sharpened(NamedTuple):
+    """Where the motion of a model begins."""
+
+    shifts: tuple[Shift, ...]
+    gain: float  # nats, over where it was taken to begin
+    of_residuals: float  # nats of these, by what is left; the rest are the onsets'
+
+
 def onsets(recordings: Sequence[Recording], as_well: bool = False) -> tuple[Shift, ...]:
     """Of the recordings whose signals begin elsewhere than at the stated time zero; as_well: or that may do so."""
     shifts = []
@@ -106,9 +114,9 @@ def time_zero_wrong(
 def sharpened(
     onsets: Sequence[Shift], taken: Sequence[Shift], structure: Structure, additions: Sequence[Addition],
     observed: Callable[[Sequence[Shift]], Sequence[ObservedRecord]], left: float,
-) -> tuple[tuple[Shift, ...], float]:  # fmt: skip
-    """The likeliest shifts for the structure with some additions; and what they gain, in nats, over those `taken` with
-    all that was found so, which left so much (rms, m/s^2).
+) -> Sharpened:  # fmt: skip
+    """The likeliest shifts for the structure with some additions; and what they gain over those `taken` with all that
+    was found so, which left so much (rms, m/s^2).
 
     The logarithm of the likelihood is that of what is left from there on, in noise as large as that, and of the onsets,
     each with its standard deviation: free curves may begin before there is any force, and do not tell when.
@@ -160,7 +168,8 @@ def sharpened(
         bent[i, j] = bent[j, i] = unlikely(moved(best, (i, j), 1)) - later[i] - later[j] + least
     stds = _stds(0.5 * bent, [onset.std / onset.period for onset in onsets])
     found = tuple(one._replace(std=one.period * max(BETWEEN, std)) for one, std in zip(best, stds, strict=True))
-    return found, 0.5 * (min(unlikely(tuple(taken)), of_both(tuple(taken), left)) - least)
+    gain = 0.5 * (min(unlikely(tuple(taken)), of_both(tuple(taken), left)) - least)
+    return Sharpened(found, gain, 0.5 * (of_both(best, left) - least))
 
 
 def _stds(precision: np.ndarray, otherwise: Sequence[float]) -> Sequence[float]:
