@@ -103,7 +103,7 @@ def test_none_is_tried_where_nothing_is_missing():
 
 
 def fitted(name: str, cost: float) -> CandidateFit:
-    addition = SimpleNamespace(key=(name, "spring"))
+    addition = SimpleNamespace(key=(name, "spring"), target="spring")
     return CandidateFit(addition, 1e5 - cost, SimpleNamespace(cost=cost))
 
 
@@ -144,6 +144,8 @@ def test_a_rare_effect_comes_into_the_ranking_where_it_leaves_noise_or_next_to_n
     found = with_rare_ones(magnitudes, EFFECTS, step)
     assert tried == asked and found.best.addition.key[0] == leads
     assert (found is step) == (leads == "friction" and left_by_rare >= 1.1e3)  # what is not believed is not told
+    on_the_spring = [SimpleNamespace(target="spring")]  # what was found there leaves what the rare one would follow
+    assert with_rare_ones(magnitudes, EFFECTS, step, on_the_spring) is step
     model.records[0].below = 240.0  # in a band alone anything leaves noise
     assert with_rare_ones(magnitudes, EFFECTS, step) is step
 

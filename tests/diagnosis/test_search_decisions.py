@@ -178,7 +178,7 @@ def test_a_search_out_of_time_has_looked_at_all_candidates_once(monkeypatch):
     monkeypatch.setattr(forward_selection, "out_of_time", lambda: True)
     monkeypatch.setattr(forward_selection, "common_effects", lambda *given: {})
     monkeypatch.setattr(forward_selection, "_next_step", lambda *given: step)
-    monkeypatch.setattr(forward_selection, "with_rare_ones", lambda m, e, first: first)
+    monkeypatch.setattr(forward_selection, "with_rare_ones", lambda m, e, first, found: first)
     monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done, path, evenly: done)
     monkeypatch.setattr(forward_selection, "better", lambda one, other: False)
     monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final, present: (path, final))

@@ -150,7 +150,7 @@ def test_beside_a_rare_effect_only_one_that_leaves_noise_is_added(monkeypatch, n
 @pytest.mark.parametrize(("rare", "beside"), [(False, [0, 1]), (True, [0])])
 def test_a_rare_effect_is_asked_for_alone_and_beside_a_common_one(monkeypatch, rare, beside):
     asked = []
-    with_rare_ones = lambda m, e, first: asked.append(len(first.before.additions)) or first  # noqa: E731
+    with_rare_ones = lambda m, e, first, found: asked.append(len(first.before.additions)) or first  # noqa: E731
     one_by_one(monkeypatch, 50.0, step, rare=rare, with_rare_ones=with_rare_ones)
     assert asked == beside
 
@@ -169,7 +169,7 @@ def one_by_one(
     little=lambda *given: False,
     noise_with: int = 9,
     hopeless=lambda *given: False,
-    with_rare_ones=lambda m, e, first: first,
+    with_rare_ones=lambda m, e, first, found: first,
 ) -> tuple[list, SimpleNamespace]:
     """Each addition takes a tenth of the mean square away; left: of it at first, search: what is found beside a model,
     noise_with: additions with which a candidate leaves noise."""

@@ -65,8 +65,9 @@ def _one_by_one(
     while not (path and out_of_time()):
         if first is None:
             first = _next_step(magnitudes, common, model, path, present)
-            if _takes_a_rare_one(model.additions[present:]):
-                first = with_rare_ones(magnitudes, effects, first)
+            found = model.additions[present:]
+            if _takes_a_rare_one(found):
+                first = with_rare_ones(magnitudes, effects, first, found)
         done, first = weighed(magnitudes, common, first, path, evenly), None
         path.append(done)
         fair = _without(model, done.best) if done.best and done.before is model else model

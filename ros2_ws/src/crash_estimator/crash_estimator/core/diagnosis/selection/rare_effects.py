@@ -2,7 +2,7 @@
 ones, alone or beside one of those, and believed only where what is left is noise, or next to nothing where no common
 one comes near. Beside a rare one that was found another one is added only where noise is left, and no rare one."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -35,8 +35,11 @@ def is_rare(addition: Addition) -> bool:
     return common is None or addition.variant not in common.variants
 
 
-def with_rare_ones(magnitudes: Magnitudes, effects: Mapping[str, Effect], step: SelectionStep) -> SelectionStep:
-    """A step of common effects, with the rare ones in its ranking where one of them is believed.
+def with_rare_ones(
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], step: SelectionStep, found: Sequence[Addition] = ()
+) -> SelectionStep:
+    """A step of common effects, with the rare ones in its ranking where one of them is believed; none on an element on
+    which one was found in a step before: it would follow what the form of that one leaves.
 
     They are fitted with care where the common ones leave more than noise, and one of them less than the best of those.
     """
@@ -49,10 +52,16 @@ def with_rare_ones(magnitudes: Magnitudes, effects: Mapping[str, Effect], step: 
     if not rare or nothing_is_missing or in_a_band or out_of_time():
         return step
     least = min([model.fit.cost, *(one.fit.cost for one in step.candidates if one.fit)])
-    alone = SelectionStep(model, fit_candidates(magnitudes, rare, model, least=least))
+    taken = {addition.target for addition in found}
+
+    def fitted(thorough: bool = False) -> SelectionStep:
+        fits = fit_candidates(magnitudes, rare, model, thorough, least=least)
+        return SelectionStep(model, [one for one in fits if one.addition.target not in taken])
+
+    alone = fitted()
     leaves_less = any(one.fit and one.fit.cost < least for one in alone.candidates)
     if leaves_less and not (step.leaves_noise or alone.leaves_noise):
-        alone = SelectionStep(model, fit_candidates(magnitudes, rare, model, thorough=True, least=least))
+        alone = fitted(thorough=True)
     if not (alone.leaves_noise or (_leaves_next_to_nothing(alone) and not _comes_near(step, alone))):
         return step
     best: dict[tuple[str, str], CandidateFit] = {}
