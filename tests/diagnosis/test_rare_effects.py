@@ -150,13 +150,24 @@ def test_a_rare_effect_comes_into_the_ranking_where_it_leaves_noise_or_next_to_n
     assert with_rare_ones(magnitudes, EFFECTS, step) is step
 
 
-@pytest.mark.parametrize(("common", "rare", "near"), [(1.66, 1.01, False), (1.66, 1.1, True), (2.1, 1.01, False)])
+CLOSE = [(1.66, 1.01, False), (1.66, 1.1, True), (2.1, 1.01, False), (1.02, 0.99, True)]
+
+
+@pytest.mark.parametrize(("common", "rare", "near"), CLOSE)
 def test_a_common_effect_comes_near_a_rare_one_unless_it_leaves_twenty_times_as_much(monkeypatch, common, rare, near):
     """In units of the noise: of a damper with a valve a usual one leaves 1.66, and its own form 1.01."""
     for module in (selection_step, rare_effects):
         monkeypatch.setattr(module, "analyse", left)
     steps = [SelectionStep(None, [fitted("an effect", cost=1e3 * leaves)]) for leaves in (common, rare)]
     assert rare_effects._comes_near(*steps) == near
+
+
+def test_beside_a_rare_effect_nothing_else_is_taken_on_the_same_element():
+    """A cushion that was sealed was told with a cubic spring beside it."""
+    step = SelectionStep(None, [fitted("friction", 1.0)])
+    elsewhere, there = ([SimpleNamespace(target=target)] for target in ("mount", "spring"))
+    assert rare_effects.elsewhere_than(elsewhere, step).candidates == step.candidates
+    assert rare_effects.elsewhere_than(there, step).candidates == []
 
 
 def test_of_an_effect_in_several_forms_those_that_are_not_looked_for_first_are_rare():

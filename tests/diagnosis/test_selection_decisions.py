@@ -147,6 +147,18 @@ def test_beside_a_rare_effect_only_one_that_leaves_noise_is_added(monkeypatch, n
     assert (len(final.additions) > 1) == (noise_with == 2)
 
 
+@pytest.mark.parametrize("rare", [True, False])
+def test_beside_a_rare_effect_only_one_elsewhere_is_looked_at(monkeypatch, rare):
+    beside, elsewhere = (SimpleNamespace(leaves_noise=noise) for noise in (True, False))
+    monkeypatch.setattr(forward_selection, "is_rare", lambda addition: rare)
+    monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda *given: beside)
+    monkeypatch.setattr(forward_selection, "only_screened", lambda *given: "nothing else")
+    monkeypatch.setattr(forward_selection, "_all_explain_too_little", lambda *given: False)
+    monkeypatch.setattr(forward_selection, "elsewhere_than", lambda rare, step: elsewhere)
+    found = forward_selection._next_step(None, {}, model(50.0, 1), [], 0)
+    assert found == ("nothing else" if rare else beside)
+
+
 @pytest.mark.parametrize(("rare", "beside"), [(False, [0, 1]), (True, [0])])
 def test_a_rare_effect_is_asked_for_alone_and_beside_a_common_one(monkeypatch, rare, beside):
     asked = []
@@ -182,6 +194,7 @@ def one_by_one(
     monkeypatch.setattr(forward_selection, "as_fitted", lambda before, found: None)
     monkeypatch.setattr(forward_selection, "_all_explain_too_little", hopeless)
     monkeypatch.setattr(forward_selection, "with_rare_ones", with_rare_ones)
+    monkeypatch.setattr(forward_selection, "elsewhere_than", lambda rare, step: step)
     monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done, path, evenly: done)
     monkeypatch.setattr(forward_selection, "_without", lambda model, found: model)
     monkeypatch.setattr(

@@ -121,15 +121,19 @@ def test_evidence_is_weighed_in_noise_as_large_as_what_is_left_or_where_next_to_
 
 @pytest.mark.parametrize(("effects", "share"), [
     (["friction", "damping"], 0.75), (["friction", "friction"], 0.96), (["friction"], 0.75), ([], 0.0),
-    (["mass"], 0.0), (["mass", "friction"], 0.0),
+    (["mass"], 0.0), (["mass", "friction"], 0.0), (["guide"], 0.75),
 ])  # fmt: skip
 def test_what_the_first_effect_explains_is_its_share_in_the_band_wherever_it_is_missing(monkeypatch, effects, share):
     """Models that leave 10, 5 and 2 m/s^2 below the class, of which the sensors' noise is next to none; nothing of what
     has no law."""
     models = [SimpleNamespace(fit=rms, residuals=None) for rms in (10.0, 5.0, 2.0)[: len(effects) + 1]]
     monkeypatch.setattr(report, "in_band", lambda rms, residuals, cfc: InBand(rms, 0.0, 3.0, cfc))
-    acts_on = {"mass": "body"}
-    added = [SimpleNamespace(effect=SimpleNamespace(name=n, acts_on=acts_on.get(n, "element"))) for n in effects]
+    acts_on = {"mass": "body", "guide": "body"}
+
+    def effect(name: str) -> SimpleNamespace:
+        return SimpleNamespace(name=name, acts_on=acts_on.get(name, "element"), on_ground=name == "guide")
+
+    added = [SimpleNamespace(effect=effect(name)) for name in effects]
     assert report._explained_by_first_effect(models, added, 60) == pytest.approx(share)
 
 

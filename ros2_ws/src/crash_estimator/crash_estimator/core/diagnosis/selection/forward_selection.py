@@ -11,7 +11,7 @@ from .even_fit import evenly_fitted
 from .fitted_model import Model
 from .pair_search import Pair, as_expected, near_the_floor, two_at_once, two_of_one_effect
 from .pruning import up_to_the_least_error, without_the_superseded
-from .rare_effects import common_effects, is_rare, with_rare_ones
+from .rare_effects import common_effects, elsewhere_than, is_rare, with_rare_ones
 from .selection_step import SelectionStep, added, as_fitted, band_of_steps, in_recorded_noise, only_screened, weighed
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
@@ -106,10 +106,12 @@ def _next_step(
     rare one or beyond two only one that leaves noise is, and none that removes next to nothing, but of what a real
     structure leaves, where the sensors' noise counts for little."""
     found = model.additions[present:]
-    only_to_noise = len(found) >= THRESHOLDS.most_at_once or any(map(is_rare, found))
+    rare = [one for one in found if is_rare(one)]
+    only_to_noise = len(found) >= THRESHOLDS.most_at_once or rare
     far_from_noise = model.residuals.mean_square >= THRESHOLDS.real_structure
     if not (only_to_noise and far_from_noise):
         step = in_recorded_noise(magnitudes, effects, model, path)
+        step = elsewhere_than(rare, step) if rare else step
         in_vain = only_to_noise or (found and not far_from_noise and _all_explain_too_little(step, path))
         if step.leaves_noise or not in_vain:
             return step

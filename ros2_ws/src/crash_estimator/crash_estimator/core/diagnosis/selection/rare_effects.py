@@ -38,8 +38,7 @@ def is_rare(addition: Addition) -> bool:
 def with_rare_ones(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], step: SelectionStep, found: Sequence[Addition] = ()
 ) -> SelectionStep:
-    """A step of common effects, with the rare ones in its ranking where one of them is believed; none on an element on
-    which one was found in a step before: it would follow what the form of that one leaves.
+    """A step of common effects, with the rare ones in its ranking where one of them is believed, beside those found.
 
     They are fitted with care where the common ones leave more than noise, and one of them less than the best of those.
     """
@@ -52,11 +51,10 @@ def with_rare_ones(
     if not rare or nothing_is_missing or in_a_band or out_of_time():
         return step
     least = min([model.fit.cost, *(one.fit.cost for one in step.candidates if one.fit)])
-    taken = {addition.target for addition in found}
 
     def fitted(thorough: bool = False) -> SelectionStep:
         fits = fit_candidates(magnitudes, rare, model, thorough, least=least)
-        return SelectionStep(model, [one for one in fits if one.addition.target not in taken])
+        return elsewhere_than(found, SelectionStep(model, fits))
 
     alone = fitted()
     leaves_less = any(one.fit and one.fit.cost < least for one in alone.candidates)
@@ -71,6 +69,13 @@ def with_rare_ones(
     return SelectionStep(model, together, together)
 
 
+def elsewhere_than(found: Iterable[Addition], step: SelectionStep) -> SelectionStep:
+    """Without the candidates on the same element: of two there, one of them rare, one follows what the form of the
+    other leaves."""
+    taken = {addition.target for addition in found}
+    return step._replace(candidates=[one for one in step.candidates if one.addition.target not in taken])
+
+
 def _leaves_next_to_nothing(step: SelectionStep) -> bool:
     """The best leaves less than the noise again, of much more: the rest may be the form of its law."""
     near = _near_the_floor(step)
@@ -78,11 +83,13 @@ def _leaves_next_to_nothing(step: SelectionStep) -> bool:
 
 
 def _comes_near(step: SelectionStep, rare: SelectionStep) -> bool:
-    """A common one leaves less than the noise again as well, and not twenty times as much of it as the rare one."""
+    """A common one leaves less than the noise again as well; not where that is a share of the noise that counts, and
+    twenty times what the rare one leaves."""
     if not _near_the_floor(step):
         return False
     left, by_rare = (analyse(one.best.fit) for one in (step, rare))
-    return share_removed(left, by_rare) < THRESHOLDS.all_but_folds
+    next_to_none = left.mean_square < 1.0 + THRESHOLDS.least_share
+    return next_to_none or share_removed(left, by_rare) < THRESHOLDS.all_but_folds
 
 
 def _near_the_floor(step: SelectionStep) -> bool:

@@ -40,7 +40,9 @@ class Thresholds(NamedTuple):
     simulated case that the usual fits lead astray was given up; on docs/outside.md both say the same."""
     least_share: float = 0.15
     """Of what the model before it leaves above the floor, of all that is sampled or in the band that the model speaks
-    for: an addition that removes less of both, and still leaves more than noise, is no explanation."""
+    for: an addition that removes less of both, and still leaves more than noise, is no explanation. And share of the
+    noise, above it, below which a common effect leaves as little as a rare one: of a damper with a valve the usual form
+    left 0.66 and the rare one 0.01, of an offset with a wrong time zero two mimics left 0.02 and nothing."""
     all_but_folds: float = 0.95
     """Share that two of a kind must remove, where they leave more than noise: the rest may be folds of the curves.
     Share from which the first effects are believed though more were added, and no two at once are looked for: 125
