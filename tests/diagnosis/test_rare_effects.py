@@ -162,6 +162,18 @@ def test_a_common_effect_comes_near_a_rare_one_unless_it_leaves_twenty_times_as_
     assert rare_effects._comes_near(*steps) == near
 
 
+@pytest.mark.parametrize(("gain", "asked"), [(11.0, False), (30.0, True)])
+def test_where_noise_is_left_as_given_rare_ones_are_asked_only_where_a_common_one_stands_out(monkeypatch, gain, asked):
+    tried = []
+    monkeypatch.setattr(rare_effects, "fit_candidates", lambda *given, **least: tried.append(given) or [])
+    for module in (selection_step, rare_effects):
+        monkeypatch.setattr(module, "analyse", left)
+    model = SimpleNamespace(white=True, fit=SimpleNamespace(cost=1e3), records=[SimpleNamespace(below=np.inf)])
+    step = SelectionStep(model, [fitted("friction", cost=1e5 - gain)])
+    found = with_rare_ones(SimpleNamespace(structure=SimpleNamespace(effects=())), EFFECTS, step)
+    assert found.candidates == step.candidates and bool(tried) == asked
+
+
 def test_beside_a_rare_effect_nothing_else_is_taken_on_the_same_element():
     """A cushion that was sealed was told with a cubic spring beside it."""
     step = SelectionStep(None, [fitted("friction", 1.0)])

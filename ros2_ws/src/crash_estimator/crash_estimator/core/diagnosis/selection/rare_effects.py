@@ -47,8 +47,8 @@ def with_rare_ones(
     rare = {name: effect for name, effect in rest.items() if effect}
     model = step.before
     in_a_band = any(np.isfinite(record.below) for record in model.records)
-    nothing_is_missing = model.white and not (step.best and step.best.gain >= THRESHOLDS.confounded)
-    if not rare or nothing_is_missing or in_a_band or out_of_time():
+    little_is_missing = model.white and not (step.best and step.best.gain > THRESHOLDS.gain_beyond_white)
+    if not rare or little_is_missing or in_a_band or out_of_time():
         return step
     least = min([model.fit.cost, *(one.fit.cost for one in step.candidates if one.fit)])
 
