@@ -8,12 +8,7 @@ import pytest
 from crash_estimator.core.diagnosis import THRESHOLDS
 from crash_estimator.core.diagnosis.online import candidate_turns
 from crash_estimator.core.diagnosis.report import diagnosis as report
-from crash_estimator.core.diagnosis.selection import (
-    assumptions,
-    fitted_model,
-    forward_selection,
-    pair_search,
-)
+from crash_estimator.core.diagnosis.selection import assumptions, fitted_model, forward_selection, pair_search
 from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
 from crash_estimator.core.diagnosis.selection.fitted_model import forces_jump
 from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
@@ -131,9 +126,10 @@ def test_beside_noise_a_first_effect_must_stand_out_from_none_and_a_second_one_m
     assert len(final.additions) == len(path) - 1 == added
 
 
-@pytest.mark.parametrize(
-    ("left", "rare", "fits"), [(10000.0, False, 2), (50.0, False, 3), (10000.0, True, 1), (50.0, True, 2)]
-)
+FITS = [(10000.0, False, 2), (50.0, False, 3), (10000.0, True, 1), (50.0, True, 2)]
+
+
+@pytest.mark.parametrize(("left", "rare", "fits"), FITS)
 def test_what_would_not_be_believed_is_not_fitted(monkeypatch, left, rare, fits):
     """Far from noise beyond two or beside a rare effect: what is left is looked at, and no candidate fitted to it."""
     asked = []
@@ -299,9 +295,3 @@ def test_a_time_zero_counts_as_what_was_added_where_no_effect_was(monkeypatch, e
     with pytest.raises(Judged):
         report._answer(SimpleNamespace(place_of=str), path, SimpleNamespace(stated=False), zero)
     assert asked == [counted]
-
-
-def test_no_time_zero_is_sought_where_the_model_as_stated_leaves_noise():
-    """A simulated car that lacks nothing was told a time zero and an unloading line, with a larger error."""
-    nothing = SimpleNamespace(final=SimpleNamespace(white=True), added=())
-    assert report._from_a_sharper_time_zero(None, (), {}, nothing, None) is None

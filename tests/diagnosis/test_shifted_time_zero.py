@@ -11,6 +11,7 @@ from crash_estimator.benchmarks.effects_judge import drawn
 from crash_estimator.benchmarks.effects_plan import case_of
 from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.diagnosis.report import diagnosis as report
 from crash_estimator.core.diagnosis.selection import time_zero
 from crash_estimator.core.diagnosis.selection.time_zero import Shift, moved_by, onsets, sharpened
 from crash_estimator.model_file import ModelFile, load_model
@@ -172,3 +173,9 @@ def test_a_gap_that_closes_is_no_wrong_time_zero():
     found = diagnose(structure, recordings)
     (step,) = found.steps
     assert (found.verdict, step.effect) == ("effect_missing", "clearance") and "the signals begin +" in found.text
+
+
+def test_no_time_zero_is_sought_where_the_model_as_stated_leaves_noise():
+    """A simulated car that lacks nothing was told a time zero and an unloading line, with a larger error."""
+    nothing = SimpleNamespace(final=SimpleNamespace(white=True), added=())
+    assert report._from_a_sharper_time_zero(None, (), {}, nothing, None) is None
