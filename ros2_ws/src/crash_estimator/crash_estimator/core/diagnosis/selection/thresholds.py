@@ -54,13 +54,13 @@ class Thresholds(NamedTuple):
     0.958 and more there in 19, in 8 of which most of the rest varies; of 57 outside the vocabulary of both simulators
     to which an effect was added one does, 0.985, a mass that changes, which a rate effect follows into the noise; the
     others 0.94 and less; of 2 more, where a mass that changes was told as one on another body, 0.96 and 0.98: so it is
-    asked of a force between two bodies only, whose law may be written another way. And share that a law with two shape
-    constants must explain to be named, or a function of the crush: hysteresis followed 0.75 to 0.79 of three looked-at
-    elements that break; of eight where it is missing and more than noise is left it explained 0.991 and more in six, in
-    the others 0.937 and 0.948. `yielding` followed 0.36 to 0.88 of seven looked-at elements that break or fold, a stop
-    0.82 to 0.85 of two that fold; of 12 stops told rightly in another form 10 explained 0.99 and more, the others 0.78
-    and 0.85. Of 24 recordings of a real impactor that yields `yielding` explained 0.95 and more, with a delay or not,
-    in 19."""
+    asked of a force between two bodies only, or on the ground, whose law may be written another way. And share that a
+    law with two shape constants must explain to be named, or a function of the crush: hysteresis followed 0.75 to 0.79
+    of three looked-at elements that break; of eight where it is missing and more than noise is left it explained 0.991
+    and more in six, in the others 0.937 and 0.948. `yielding` followed 0.36 to 0.88 of seven looked-at elements that
+    break or fold, a stop 0.82 to 0.85 of two that fold; of 12 stops told rightly in another form 10 explained 0.99 and
+    more, the others 0.78 and 0.85. Of 24 recordings of a real impactor that yields `yielding` explained 0.95 and more,
+    with a delay or not, in 19."""
 
     # What is said, of what leaves more than noise
     most_at_once: int = 2
