@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, filtfilt, lfilter
 
-from crash_estimator.core.noise_spectrum import CORNER, NoiseSpectrum, noise_spectrum
+from crash_estimator.core.noise_spectrum import CORNER, NoiseSpectrum, colour_of, noise_spectrum
 
 PERIOD, REST, TIMES = 1e-4, 300, 60
 
@@ -73,3 +73,44 @@ def test_a_body_that_sways_before_the_impact_says_nothing_of_the_noise():
     rng = np.random.default_rng(3)
     swaying = rng.standard_normal(REST) + 3.0 * np.sin(2.0 * np.pi * 10.0 * PERIOD * np.arange(REST))
     assert noise_spectrum(swaying, PERIOD).white
+
+
+def test_slow_noise_that_one_rest_cannot_tell_is_told_by_several_of_any_strength():
+    """Behind a pole at 170 Hz, as the noise of an AR(1) of 0.9 at 10 kHz is."""
+    pole, rng = np.exp(-2.0 * np.pi * 170.0 * PERIOD), np.random.default_rng(4)
+    alone, together = [], []
+    for _ in range(TIMES):
+        rests = [behind_a_pole(170.0)(size * rng.standard_normal(3 * REST))[REST : 2 * REST] for size in (1, 2, 5, 1)]
+        alone.append(noise_spectrum(rests[1], PERIOD))
+        together.append(noise_spectrum(rests[1], PERIOD, [colour_of(rests)]))
+    assert sum(one.white for one in alone) > 0.5 * TIMES and not any(one.white for one in together)
+    slow = np.array([0.0])
+    zero = [one.std * float(np.sqrt(one.density(slow)[0])) for one in together]
+    logarithm = np.log(zero)
+    assert np.median(logarithm) == pytest.approx(np.log(2.0) + 0.5 * np.log((1.0 + pole) / (1.0 - pole)), abs=0.15)
+    told = np.median([one.samples for one in together])
+    assert np.std(logarithm) == pytest.approx(1.0 / np.sqrt(2.0 * told), rel=0.35), "as well as it says it is known"
+
+
+def test_a_sensor_of_another_colour_keeps_its_own():
+    rng = np.random.default_rng(5)
+    coloured = [behind_a_pole(300.0)(rng.standard_normal(3 * REST))[REST : 2 * REST] for _ in range(5)]
+    white = rng.standard_normal(REST)
+    alike = [colour_of([*coloured, white])]
+    assert noise_spectrum(white, PERIOD, alike).white
+    assert noise_spectrum(white, PERIOD, alike) == noise_spectrum(white, PERIOD)
+    assert not noise_spectrum(coloured[0], PERIOD, [colour_of(coloured)]).white
+
+
+def test_several_sensors_on_bodies_that_sway_say_no_more_than_one():
+    rng, time = np.random.default_rng(6), PERIOD * np.arange(REST)
+    rests = [rng.standard_normal(REST) + 3.0 * np.sin(2.0 * np.pi * 10.0 * time) for _ in range(8)]
+    alike = [colour_of(rests)]
+    assert len(alike[0].coefficients), "they are coloured"
+    assert all(noise_spectrum(rest, PERIOD, alike).white for rest in rests)
+
+
+def test_sensors_without_noise_have_no_colour():
+    assert noise_spectrum(np.full(REST, 3.0), PERIOD, [colour_of([np.full(REST, 3.0)] * 2)]) == NoiseSpectrum(
+        0.0, REST, period=PERIOD
+    )

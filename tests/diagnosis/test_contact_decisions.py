@@ -60,10 +60,11 @@ def with_contacts(monkeypatch, promised, noise_under="none", ends_early=False) -
     (1.1, 200_000.0, False),  # nothing beside what is left above the noise of a thousand samples
 ])  # fmt: skip
 def test_other_contacts_must_explain_a_share_of_what_is_above_the_noise(monkeypatch, gain, cost, promises):
-    final = model(cost=cost, additions=("one",))
+    one = SimpleNamespace(key=("one", "element"))
+    final = model(cost=cost, additions=(one,))
     record = SimpleNamespace(bins=500, measured=np.zeros((1, 2)))
     path = SimpleNamespace(
-        structure="as stated", added=("one",), final=final, cells=36, steps=[SimpleNamespace(before=final)],
+        structure="as stated", added=(one,), final=final, cells=36, steps=[SimpleNamespace(before=final)],
         as_recorded=final.fit,
     )  # fmt: skip
     otherwise = SimpleNamespace(evidence=gain * THRESHOLDS.gain)

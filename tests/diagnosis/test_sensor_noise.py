@@ -7,14 +7,19 @@ import re
 import numpy as np
 import pytest
 import yaml
+from scipy.signal import lfilter
 
 from crash_estimator.benchmarks.second_judge import judge, right
 from crash_estimator.core.diagnosis import diagnose
+from crash_estimator.core.diagnosis.observation.rest import rests_of
 from crash_estimator.core.diagnosis.observation.whitening import filtered, weights
 from crash_estimator.core.noise_spectrum import NoiseSpectrum
 from crash_estimator.core.sensor_noise import sensor_noise
 from crash_estimator.model_file import ModelFile
+from crash_replay.recording import Channel, Recording, Test
 from crash_replay.second_generator.cases import case_of, drawn
+from crash_replay.second_generator.sensors import RATE, Sensors
+from crash_replay.second_generator.structures import G
 
 NOTHING_HIDDEN = (
     "cab/nothing/1g/coloured/71100276", "sled/nothing/0.5g/cfc180/71100144", "cab/nothing/2g/ringing/71100243",
@@ -56,6 +61,37 @@ def test_what_rings_is_told():
     assert re.search(
         r"adequate: .*; what rings above 240 Hz, 1\.\d+ g, is left out$", diagnose(structure, it.recordings).text
     )
+
+
+def test_the_noise_of_a_right_model_is_known_where_one_rest_is_too_short_for_it(monkeypatch):
+    """Behind a pole at 170 Hz, as the noise of an AR(1) of 0.9 at 10 kHz is."""
+    pole = np.exp(-2.0 * np.pi * 170.0 / RATE)
+
+    def slow(self, name, signal, time, corner, end, rng):
+        noise = lfilter([np.sqrt(1.0 - pole**2)], [1.0, -pole], rng.standard_normal(len(signal)))
+        return signal + self.noise * G * noise
+
+    monkeypatch.setattr(Sensors, "_noisy", slow)
+    assert judge(case_of("side/nothing/1g/clean/71100008"))["verdict"] == "adequate"
+
+
+def test_only_recordings_that_are_sampled_alike_say_something_of_each_others_noise():
+    rng, channels = np.random.default_rng(1), (Channel("a", "acceleration", "car"),)
+
+    def recording(period_ns, colour):
+        time_ns = np.arange(-300, 100) * period_ns
+        return Recording(
+            Test("one", channels), time_ns, lfilter([1.0], [1.0, -colour], rng.standard_normal((400, 1)), axis=0)
+        )
+
+    slow, other, white = recording(100_000, 0.8), recording(100_000, 0.8), recording(200_000, 0.0)
+    colours = [rest.colours["a"] for rest in rests_of([slow, other, white])]
+    assert [[len(one.coefficients) > 0 for one in each] for each in colours] == [
+        [True, True],
+        [True, True],
+        [False, False],
+    ]
+    assert [[one.samples for one in each] for each in colours] == [[600, 600], [600, 600], [300, 300]]
 
 
 def test_coloured_noise_is_white_once_it_is_weighted():

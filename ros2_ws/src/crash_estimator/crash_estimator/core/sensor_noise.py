@@ -1,5 +1,6 @@
 """How large a sensor's own noise is: from its rest before the impact and from its high-frequency content after it."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from .differences import by_differences
 
 if TYPE_CHECKING:
-    from .noise_spectrum import NoiseSpectrum
+    from .noise_spectrum import Colour, NoiseSpectrum
 
 ENOUGH = 30
 """Samples before the impact from which their scatter is taken seriously."""
@@ -25,15 +26,17 @@ SMALLEST = 1e-6
 """Share of the largest value that noise is taken to be at least: a simulation without any is divided by it too."""
 
 
-def sensor_noise(values: np.ndarray, time_ns: np.ndarray, rests: bool) -> "NoiseSpectrum":
+def sensor_noise(
+    values: np.ndarray, time_ns: np.ndarray, rests: bool, alike: "Sequence[Colour]" = ()
+) -> "NoiseSpectrum":
     """Of values (n,). A vibrating structure is noisier in the crash than at rest: then that is the floor a model can
-    reach. Rest alone tells whether neighbouring samples are alike."""
+    reach. Rest alone tells whether neighbouring samples are alike; alike: colours that the noise of other rests has."""
     from .noise_spectrum import NoiseSpectrum, noise_spectrum  # late: a viewer has started before there is any noise
 
     before, after = values[time_ns < 0], values[time_ns >= 0]
     period = float(np.median(np.diff(time_ns))) * 1e-9
     rests = rests and len(before) >= ENOUGH
-    at_rest = noise_spectrum(before, period) if rests else NoiseSpectrum(np.nan, 0.0)
+    at_rest = noise_spectrum(before, period, alike) if rests else NoiseSpectrum(np.nan, 0.0)
     rest, busy = at_rest.std, np.nan
     if len(after) >= ENOUGH and period * FAST > 1.0 and not rests:
         busy = _highest_frequencies(after)

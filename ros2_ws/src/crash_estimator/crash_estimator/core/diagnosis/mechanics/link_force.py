@@ -139,7 +139,7 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
             columns += [beside.gate * c * d for d in by_shape]
         for term in link.remembering:
             beside = crushed if link.outlasts(term.addition.effect) else contact
-            memories.append(_remembered(term, link, theta, time, x, beside, parameters, columns))
+            memories += _remembered(term, link, theta, time, x, beside, parameters, columns)
         for beside in (contact, crushed) if crushed is not contact else (contact,):
             force = force + beside.gate * beside.force
             kx, kv = kx + beside.gate * beside.px + beside.slope * beside.force, kv + beside.gate * beside.pv
@@ -196,20 +196,23 @@ def _inside(term: Term, theta: np.ndarray, at: np.ndarray) -> _Inside:
     return _Inside(c * f, c * slope, parameters, [f, *(c * each for each in by_shape)])
 
 
-def _remembered(term: Term, link: Link, theta, time, x, beside: _Beside, parameters, columns) -> Memory:
-    """c z is added to the forces beside the spring, derivatives are appended -> its memory."""
+def _remembered(term: Term, link: Link, theta, time, x, beside: _Beside, parameters, columns) -> list[Memory]:
+    """c z is added to the forces beside the spring, derivatives are appended -> its memory, where c z is something."""
     c, shapes = theta[term.coefficient], term.shapes_at(theta)
     memory = partial(_physics(term).memory, np.concatenate([time[:1], time]), form=term.addition.variant)
     crush = np.concatenate([[0.0], x if link.tension else np.maximum(x, 0.0)])
     z, kept, by_crush, by_before = (each[1:] for each in memory(crush, 0.0, **shapes))
-    parameters += [term.coefficient, *term.varied.values()]
     gate = beside.gate
-    columns += [gate * z]
+    parameters.append(term.coefficient)
+    columns.append(gate * z)
+    if not c:  # nothing that the motion or a shape constant would change
+        return []
+    parameters += term.varied.values()
     columns += [gate * c * d for d in term.by_shapes(theta, z, lambda **s: memory(crush, 0.0, **s)[0][1:])]
     if not link.tension:
         by_crush, by_before = by_crush * (x > 0.0), by_before * (crush[:-1] > 0.0)
     beside.add(c * z, c * by_crush, 0.0)
-    return Memory(kept, by_crush, by_before, gate * c)
+    return [Memory(kept, by_crush, by_before, gate * c)]
 
 
 def _slopes(term: Term, theta: np.ndarray, motion: ElementMotion, force: np.ndarray):

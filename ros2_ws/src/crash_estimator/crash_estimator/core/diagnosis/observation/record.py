@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crash_replay.onset import find_onset
+from crash_replay.conditioning import RESTS_AT_ZERO
 from crash_replay.recording import SI_UNIT, Recording, Test
 
 from ...derived_motion import between_samples, smoothed
@@ -20,6 +20,7 @@ from ...sensor_noise import sensor_noise
 from ...structure import ModelError, Structure
 from .grid import bins_of, cosines_of, grid_of, on_grid
 from .pace import longest_step
+from .rest import Rest, bridged, rests_of
 from .tracked_motion import tracked_acceleration
 from .whitening import coefficients, filtered, weights
 
@@ -175,8 +176,11 @@ def comparable(
     return tuple(found)
 
 
-def observe(structure: Structure, recording: Recording) -> ObservedRecord:
-    """Raises ModelError or RecordingError, one line, where the recording does not serve the model."""
+def observe(structure: Structure, recording: Recording, rest: Rest | None = None) -> ObservedRecord:
+    """rest: one of `rests_of` it and others of the same system.
+
+    Raises ModelError or RecordingError, one line, where the recording does not serve the model.
+    """
     kinematics = Kinematics(structure, recording.test)  # checks the channels, knows the initial motion
     after = recording.time_ns >= 0
     if np.count_nonzero(after) < FEWEST_SAMPLES:
@@ -188,11 +192,11 @@ def observe(structure: Structure, recording: Recording) -> ObservedRecord:
     outputs = outputs_of(structure)
     names = [name for _, name, _ in structure.channels()]
     names += [c.name for c in recording.test.channels if c.quantity == "acceleration"]
-    rest = _rest_ends(recording)
+    rest = rest or rests_of([recording])[0]
     signals = {name: _signal(recording, name, time, rest) for name in dict.fromkeys(names)}
     for element in structure.elements:
         if element.displacement:
-            signals[element.displacement] = _from_rest(signals[element.displacement], element.tension, rest)
+            signals[element.displacement] = _from_rest(signals[element.displacement], element.tension, rest.ends)
     start = np.array([kinematics.initial_displacement, kinematics.initial_velocity])
     for k, body in enumerate(structure.bodies):
         if body.applied:
@@ -231,27 +235,20 @@ def observe(structure: Structure, recording: Recording) -> ObservedRecord:
     return record.in_band(np.inf)
 
 
-def _rest_ends(recording: Recording) -> int:
-    """ns: until when nothing moves, the stated time zero or an earlier onset; motion is no noise of a sensor's."""
-    onset = find_onset(recording)
-    return min(0, onset.time_ns - onset.precision_ns) if onset and onset.differs else 0
-
-
-def _signal(recording: Recording, name: str, grid: np.ndarray, rest_ends: int) -> Signal:
-    values = recording.column(name)
-    valid = np.isfinite(values)
+def _signal(recording: Recording, name: str, grid: np.ndarray, rest: Rest) -> Signal:
+    valid = np.isfinite(recording.column(name))
     if not valid.any():
         raise ModelError(f"test {recording.test.id}: channel {name} has no valid sample")
     channel = recording.test.channels[recording.test.index(name)]
-    before = valid & (recording.time_ns < rest_ends)
+    before = valid & (recording.time_ns < rest.ends)
     count = np.count_nonzero(before)
-    rests = channel.quantity in ("acceleration", "force")
-    offset = float(values[before].mean()) if rests and count else 0.0
-    bridged = np.interp(recording.time_ns, recording.time_ns[valid], values[valid]) - offset
-    noise = sensor_noise(bridged, recording.time_ns - rest_ends, rests)
-    bridged = noise.unfiltered(bridged)
-    values = np.interp(grid, recording.time, bridged)
-    return Signal(recording.time, bridged, values, noise, noise.std / np.sqrt(count) if count else 0.0)
+    rests = channel.quantity in RESTS_AT_ZERO
+    offset = float(recording.column(name)[before].mean()) if rests and count else 0.0
+    values = bridged(recording, name) - offset
+    noise = sensor_noise(values, recording.time_ns - rest.ends, rests, rest.colours.get(name, ()))
+    values = noise.unfiltered(values)
+    on_grid = np.interp(grid, recording.time, values)
+    return Signal(recording.time, values, on_grid, noise, noise.std / np.sqrt(count) if count else 0.0)
 
 
 def _from_rest(crush: Signal, tension: bool, rest_ends: int) -> Signal:

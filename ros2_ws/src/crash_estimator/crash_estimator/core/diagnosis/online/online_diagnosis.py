@@ -20,6 +20,7 @@ from ...kinematics import Kinematics
 from ...structure import EffectSpec, Structure
 from ..observation.bin_means import in_bins
 from ..observation.record import FEWEST_SAMPLES, ObservedRecord, observe
+from ..observation.rest import rests_of
 from ..output_error.gauss_newton import fit
 from ..output_error.problem import make_problem
 from ..parameterization.layout import Layout
@@ -57,7 +58,8 @@ class OnlineDiagnosis:
 
     def __post_init__(self):
         Kinematics(self.structure, self.test)
-        object.__setattr__(self, "other_records", [observe(self.structure, other) for other in self.others])
+        others = zip(self.others, rests_of(self.others), strict=True)
+        object.__setattr__(self, "other_records", [observe(self.structure, *other) for other in others])
 
     def init(self) -> OnlineState:
         return OnlineState()
@@ -67,7 +69,7 @@ class OnlineDiagnosis:
         if np.count_nonzero(recording.time_ns >= 0) < FEWEST_SAMPLES:
             return state, None
         out_of_time = _clock(self.budget)
-        full = [observe(self.structure, recording), *self.other_records]
+        full = [observe(self.structure, recording, rests_of([recording, *self.others])[0]), *self.other_records]
         records = [in_bins(record) for record in full]
         magnitudes = measure_magnitudes(
             self.structure, records, min(CELLS, CELLS_IN_ALL // len(self.structure.elements))

@@ -11,20 +11,18 @@ from ...derived_motion import with_accelerations
 from ...effects import EFFECTS
 from ...effects.effect import Addition, Effect
 from ...structure import ModelError, Structure
-from ..observation.pace import at_its_own_pace
-from ..observation.record import ObservedRecord, observe
 from ..residuals.in_band import in_band
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import analyse, free_run, noise_floor
 from ..residuals.score_test import Drift, drift_of
 from ..selection.acceptance import needed_share, settled
-from ..selection.assumptions import SelectionPath, first_believed, select, up_to
+from ..selection.assumptions import SelectionPath, up_to
 from ..selection.fitted_model import Model
-from ..selection.rare_effects import common_effects
+from ..selection.onset_search import select_from_the_onset
 from ..selection.selection_step import band_of_steps, fit_of_all, sized_models
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_limit import out_of_time, time_limit
-from ..selection.time_zero import Shift, TimeZero, moved_by, onsets, sharpened, time_zero_wrong
+from ..selection.time_zero import TimeZero
 from .fitted_constants import FittedConstant, fitted_constants
 from .left import Left, left_by
 from .model_effects import structure_with
@@ -109,79 +107,15 @@ def diagnose(
     recordings, clipped = without_clipped(recordings)
     structure, recordings = with_accelerations(structure, recordings)
     with time_limit(seconds):
-        records, zero, unused = _observed(structure, recordings, common_effects(structure, effects))
-        path = first_believed(select(structure, records, effects))
-        if zero or unused:
-            sharper = _from_a_sharper_time_zero(structure, recordings, effects, path, zero)
-            path, zero, unused = sharper or (path, zero, unused)
+        begun = select_from_the_onset(structure, recordings, effects)
         stopped = out_of_time()
-    found = _answer(structure, path, tolerance, zero)
+    found = _answer(structure, begun.path, tolerance, begun.zero)
     remarks = [clipped] if clipped else []
-    if unused:
-        remarks.append(signals_begin({shift.test: shift.seconds for shift in unused}))
+    if begun.unused:
+        remarks.append(signals_begin({shift.test: shift.seconds for shift in begun.unused}))
     if stopped:
         remarks.append(f"stopped after {seconds:g} s: not everything was tried")
     return replace(found, stopped=stopped, text="; ".join([found.text, *remarks]))
-
-
-def _observed(
-    structure: Structure, recordings: Sequence[Recording], effects: Mapping[str, Effect]
-) -> tuple[list[ObservedRecord], TimeZero | None, tuple[Shift, ...]]:
-    """The recordings from the stated time zero on, or from their onset where that comes first and the model leaves less
-    of them so; and onsets elsewhere that they are not taken from."""
-    records, elsewhere = _from(structure, recordings), onsets(recordings)
-    early = tuple(shift for shift in elsewhere if shift.seconds < -records[shift.recording].seen_early)
-    if early:
-        from_onset = _from(structure, recordings, early)
-        zero = time_zero_wrong(structure, records, from_onset, early, effects)
-        if zero:
-            return from_onset, zero, tuple(shift for shift in elsewhere if shift not in early)
-    return records, None, elsewhere
-
-
-def _from(structure: Structure, recordings: Sequence[Recording], shifts: Sequence[Shift] = ()) -> list[ObservedRecord]:
-    return [observe(structure, at_its_own_pace(structure, one)) for one in moved_by(shifts, recordings)]
-
-
-def _from_a_sharper_time_zero(
-    structure: Structure, recordings: Sequence[Recording], effects: Mapping[str, Effect], found: SelectionPath,
-    zero: TimeZero | None,
-) -> tuple[SelectionPath, TimeZero | None, tuple[Shift, ...]] | None:  # fmt: skip
-    """What is found from where the motion with the first effect that was found begins: where that leaves less than all
-    that was found, and then noise, as that does not, or does with more effects. Twice, as what came first may have been
-    found for the time zero. One effect beside a time zero may make up for what that is off: what is found from where
-    the motion of the model as given begins, where that leaves as little and lacks nothing.
-    """
-    if found.final.white and not (found.added or zero):  # as stated the model lacks nothing
-        return None
-    begins = onsets(recordings, as_well=True)
-    used = {shift.recording: shift.seconds for shift in zero.shifts} if zero else {}
-    shifts = tuple(shift._replace(seconds=used.get(shift.recording, 0.0)) for shift in begins)
-    as_stated = zero.as_stated if zero else found.steps[0].before
-    most = len(found.added) - 1 if found.noise else THRESHOLDS.few  # effects that would be an improvement
-
-    def observed(shifts: Sequence[Shift]) -> list[ObservedRecord]:
-        return _from(structure, recordings, shifts)
-
-    path = found
-    for _ in range(2 if most > 0 else 1 if zero else 0):
-        left = analyse(path.as_recorded)
-        if left.mean_square >= THRESHOLDS.real_structure or out_of_time():
-            return None
-        additions = (*path.final.additions[: path.present], *path.added[: min(most, 1)])
-        sharp = sharpened(begins, shifts, path.structure, additions, observed, left.rms)
-        shifts = sharp.shifts
-        if sharp.of_residuals < -THRESHOLDS.gain or (most and not sharp.gain > THRESHOLDS.gain):
-            return None
-        path = first_believed(select(structure, observed(shifts), effects))
-        if path.noise:
-            elsewhere = tuple(shift for shift in shifts if abs(shift.seconds) > shift.period)
-            moved = TimeZero(elsewhere, as_stated) if elsewhere else None
-            if len(path.added) > most:
-                return None
-            alone = moved and path.added and _from_a_sharper_time_zero(structure, recordings, effects, path, moved)
-            return alone or (path, moved, ())
-    return None
 
 
 def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zero: TimeZero | None) -> Diagnosis:

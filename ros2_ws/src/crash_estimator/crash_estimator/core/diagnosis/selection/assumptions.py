@@ -140,10 +140,12 @@ def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedR
     models = [step.before for step in path.steps]
     models = models if models[-1] is final else [*models, final]
     found = ((model.additions, in_the_sensors_noise(model, records)) for model in models)
-    most = -np.inf
+    most, seen = -np.inf, set()
     for additions, as_recorded in chain(found, _likely(path)):
-        if not moves_otherwise(as_recorded, other):
+        what = frozenset(one.key for one in additions)
+        if what in seen or not moves_otherwise(as_recorded, other):
             continue
+        seen.add(what)
         otherwise = fit(make_problem(magnitudes, records, additions))
         misfit = 0.5 * max(as_recorded.cost - cost_of_noise(records), 0.0)  # nats
         if otherwise.evidence > as_recorded.evidence + THRESHOLDS.gain + THRESHOLDS.least_share * misfit:

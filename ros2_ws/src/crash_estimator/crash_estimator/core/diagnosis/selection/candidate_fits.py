@@ -166,7 +166,7 @@ class _Search:
         screening, which takes it for small, may see nothing of one that explains as much."""
         best = self.ranking()[0].addition
         kin = [o for o in self.screened if o.addition.effect.changes_law and o.addition.target == best.target]
-        delays = [o for o in self.screened if o.addition.effect.distorts == "delay"]
+        delays = shortlist([o for o in self.screened if o.addition.effect.distorts == "delay"], THRESHOLDS.few)
         new = [o for o in [*kin, *delays] if self.found[o.addition.key].fit is None]
         self.from_motion(shortlist(new, len(new)))
 

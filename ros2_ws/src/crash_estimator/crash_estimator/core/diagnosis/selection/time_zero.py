@@ -9,9 +9,9 @@ is right says sharper when its motion began: what it leaves is least from there 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from itertools import combinations
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -21,10 +21,12 @@ from crash_replay.recording import Recording
 from ...effects.effect import Addition, Effect
 from ...structure import ModelError, Structure
 from ..observation.record import ObservedRecord
+from ..output_error.gauss_newton import fit
 from ..output_error.normal_equations import may_diverge
-from ..parameterization.magnitudes import measure_magnitudes
+from ..output_error.problem import make_problem
+from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
 from ..parameterization.model_terms import additions_of
-from ..residuals.residuals import rms
+from ..residuals.residuals import Residuals, analyse, rms
 from .assumptions import CELLS
 from .fitted_model import Model, fit_model
 from .thresholds import THRESHOLDS
@@ -37,6 +39,9 @@ FARTHEST = 2.0 * AS_WELL**0.5
 """Standard deviations that an onset may be off: twice as far as any that fits its signals as well."""
 
 
+Observed: TypeAlias = "Callable[[Sequence[Shift]], Sequence[ObservedRecord]]"
+
+
 class Shift(NamedTuple):
     """Of a recording's time zero."""
 
@@ -45,6 +50,7 @@ class Shift(NamedTuple):
     seconds: float  # from the stated one to the onset
     std: float  # s
     period: float  # s, of its samples
+    differs: bool = True  # from the stated one by more than it can be wrong
 
 
 class TimeZero(NamedTuple):
@@ -71,6 +77,7 @@ class Sharpened(NamedTuple):
     shifts: tuple[Shift, ...]
     gain: float  # nats, over where it was taken to begin
     of_residuals: float  # nats of these, by what is left; the rest are the onsets'
+    mean_square: float  # that is left from there on, in units of the noise
 
 
 def onsets(recordings: Sequence[Recording], as_well: bool = False) -> tuple[Shift, ...]:
@@ -83,7 +90,7 @@ def onsets(recordings: Sequence[Recording], as_well: bool = False) -> tuple[Shif
         seconds, precision = onset.time_ns * 1e-9, onset.precision_ns * 1e-9
         if onset.differs or (as_well and abs(seconds) > period):
             std = max(precision * AS_WELL**-0.5, period * BETWEEN)
-            shifts.append(Shift(k, recording.test.id, seconds, std, period))
+            shifts.append(Shift(k, recording.test.id, seconds, std, period, onset.differs))
     return tuple(shifts)
 
 
@@ -112,64 +119,125 @@ def time_zero_wrong(
 
 @may_diverge
 def sharpened(
-    onsets: Sequence[Shift], taken: Sequence[Shift], structure: Structure, additions: Sequence[Addition],
-    observed: Callable[[Sequence[Shift]], Sequence[ObservedRecord]], left: float,
+    onsets: Sequence[Shift], taken: Sequence[Shift], structure: Structure, choices: Sequence[Sequence[Addition]],
+    observed: Observed, left: float,
 ) -> Sharpened:  # fmt: skip
-    """The likeliest shifts for the structure with some additions; and what they gain over those `taken` with all that
-    was found so, which left so much (rms, m/s^2).
+    """The likeliest shifts for the structure with the likeliest of some choices of additions; and what they gain over
+    those `taken` with all that was found so, which left so much (rms, m/s^2)."""
+    taken = tuple(taken)
+    bins = sum(record.bins * record.measured.shape[1] for record in observed(taken))
+    starts = [MotionStart(onsets, structure, additions, observed, bins) for additions in choices]
+    start, near = min(((one, one.about(taken)) for one in starts), key=lambda pair: pair[0].roughly(pair[1]))
+    best = start.to_the_sample(near)
+    least, as_found = start.unlikely(best), start.of_both(taken, left)
+    gain = 0.5 * (min(start.unlikely(taken), as_found) - least)
+    of_residuals = 0.5 * (start.of_both(best, left) - least)
+    return Sharpened(start.with_stds(best), gain, of_residuals, start.left_from(best).mean_square)
+
+
+class _Nothing(NamedTuple):
+    """Where no motion can begin."""
+
+    rms: float = np.inf
+    mean_square: float = np.inf
+
+
+class MotionStart:
+    """Where the motion of a structure with some additions begins.
 
     The logarithm of the likelihood is that of what is left from there on, in noise as large as that, and of the onsets,
     each with its standard deviation: free curves may begin before there is any force, and do not tell when.
 
     A pattern search to the sample (Hooke and Jeeves 1961), each recording's in turn and all together: from its onset,
     from what was taken for it, or from the stated time zero, in steps that are halved, the first as long as its onset
-    may be wrong by. The standard deviations are those of a parabola through the samples next to it. observed(shifts)
-    -> the records.
+    may be wrong by.
     """
-    bins = sum(record.bins * record.measured.shape[1] for record in observed(taken))
 
-    def of_both(shifts: tuple[Shift, ...], rms: float) -> float:
+    def __init__(
+        self, onsets: Sequence[Shift], structure: Structure, additions: Sequence[Addition], observed: Observed,
+        bins: int,
+    ):  # fmt: skip
+        """observed(shifts) -> the records; bins of all outputs in all of them."""
+        self.onsets, self.structure, self.additions, self.observed = onsets, structure, additions, observed
+        self.bins = bins
+        self.step = max(1, *(int(onset.std / onset.period) for onset in onsets))
+        self.each = [(k,) for k in range(len(onsets))]
+        self.left_from = cache(partial(self._left_from, _with_care))
+        self.left_about = cache(partial(self._left_from, _fitted))
+
+    def of_both(self, shifts: Sequence[Shift], rms: float) -> float:
         """Twice the negative logarithm of the likelihood of what is left and of the onsets, less constants."""
-        off = sum(((one.seconds - onset.seconds) / onset.std) ** 2 for one, onset in zip(shifts, onsets, strict=True))
-        return 2.0 * bins * float(np.log(rms)) + off if np.isfinite(rms) else np.inf
+        pairs = zip(shifts, self.onsets, strict=True)
+        off = sum(((one.seconds - onset.seconds) / onset.std) ** 2 for one, onset in pairs)
+        return 2.0 * self.bins * float(np.log(rms)) + off if np.isfinite(rms) else np.inf
 
-    @cache
-    def unlikely(shifts: tuple[Shift, ...]) -> float:
+    def unlikely(self, shifts: tuple[Shift, ...]) -> float:
         """The same, with the additions from there on."""
-        pairs = zip(shifts, onsets, strict=True)
+        return self.of_both(shifts, self.left_from(shifts).rms)
+
+    def roughly(self, shifts: tuple[Shift, ...]) -> float:
+        """The same, from one fit each."""
+        return self.of_both(shifts, self.left_about(shifts).rms)
+
+    def _left_from(self, left_by: Callable[..., Residuals], shifts: tuple[Shift, ...]) -> Residuals | _Nothing:
+        """left_by(magnitudes, records, additions)."""
+        pairs = zip(shifts, self.onsets, strict=True)
         if any(abs(one.seconds - onset.seconds) > abs(onset.seconds) + FARTHEST * onset.std for one, onset in pairs):
-            return np.inf
+            return _Nothing()
         try:
-            records = observed(shifts)
+            records = self.observed(shifts)
         except ModelError:  # too little is left from there on
-            return np.inf
-        found = fit_model(measure_magnitudes(structure, records, CELLS), records, additions)
-        return of_both(shifts, found.residuals.rms)
+            return _Nothing()
+        return left_by(measure_magnitudes(self.structure, records, CELLS), records, self.additions)
 
-    def moved(shifts: tuple[Shift, ...], which: Sequence[int], samples: int) -> tuple[Shift, ...]:
-        by = [samples * one.period if k in which else 0.0 for k, one in enumerate(shifts)]
-        return tuple(one._replace(seconds=one.seconds + s) for one, s in zip(shifts, by, strict=True))
+    def about(self, taken: tuple[Shift, ...]) -> tuple[Shift, ...]:
+        """Within the first step."""
+        best = taken
+        for k, onset in enumerate(self.onsets):
+            starts = best[k], onset, onset._replace(seconds=0.0)
+            best = min(((*best[:k], start, *best[k + 1 :]) for start in starts), key=self.roughly)
+        return self._walked(best, self.step, self.roughly)
 
-    each, together = [(k,) for k in range(len(onsets))], tuple(range(len(onsets)))
-    best = tuple(taken)
-    for k, onset in enumerate(onsets):
-        starts = best[k], onset, onset._replace(seconds=0.0)
-        best = min(((*best[:k], start, *best[k + 1 :]) for start in starts), key=unlikely)
-    step = max(1, *(int(onset.std / onset.period) for onset in onsets))
-    while step and not out_of_time():
-        before = best
-        for which in [*each, together]:
-            best = min((best, moved(best, which, -step), moved(best, which, step)), key=unlikely)
-        step //= 1 if best != before else 2
+    def to_the_sample(self, best: tuple[Shift, ...]) -> tuple[Shift, ...]:
+        step = max(1, self.step // 2)
+        while step:
+            best = self._walked(best, step, self.unlikely)
+            step //= 2
+        return best
 
-    least, later = unlikely(best), [unlikely(moved(best, which, 1)) for which in each]
-    bent = np.diag([unlikely(moved(best, which, -1)) + up - 2.0 * least for which, up in zip(each, later, strict=True)])
-    for i, j in combinations(range(len(onsets)), 2):
-        bent[i, j] = bent[j, i] = unlikely(moved(best, (i, j), 1)) - later[i] - later[j] + least
-    stds = _stds(0.5 * bent, [onset.std / onset.period for onset in onsets])
-    found = tuple(one._replace(std=one.period * max(BETWEEN, std)) for one, std in zip(best, stds, strict=True))
-    gain = 0.5 * (min(unlikely(tuple(taken)), of_both(tuple(taken), left)) - least)
-    return Sharpened(found, gain, 0.5 * (of_both(best, left) - least))
+    def with_stds(self, best: tuple[Shift, ...]) -> tuple[Shift, ...]:
+        """The standard deviations are those of a parabola through the samples next to it."""
+        least, later = self.unlikely(best), [self.unlikely(_moved(best, which, 1)) for which in self.each]
+        pairs = zip(self.each, later, strict=True)
+        bent = np.diag([self.unlikely(_moved(best, which, -1)) + up - 2.0 * least for which, up in pairs])
+        for i, j in combinations(range(len(best)), 2):
+            bent[i, j] = bent[j, i] = self.unlikely(_moved(best, (i, j), 1)) - later[i] - later[j] + least
+        stds = _stds(0.5 * bent, [onset.std / onset.period for onset in self.onsets])
+        return tuple(one._replace(std=one.period * max(BETWEEN, std)) for one, std in zip(best, stds, strict=True))
+
+    def _walked(
+        self, best: tuple[Shift, ...], step: int, unlikely: Callable[[tuple[Shift, ...]], float]
+    ) -> tuple[Shift, ...]:
+        """As far as steps of so many samples lead."""
+        before = None
+        while best != before and not out_of_time():
+            before = best
+            for which in [*self.each, tuple(range(len(best)))]:
+                best = min((best, _moved(best, which, -step), _moved(best, which, step)), key=unlikely)
+        return best
+
+
+def _with_care(magnitudes: Magnitudes, records: Sequence[ObservedRecord], additions: Sequence[Addition]) -> Residuals:
+    return fit_model(magnitudes, records, additions).residuals
+
+
+def _fitted(magnitudes: Magnitudes, records: Sequence[ObservedRecord], additions: Sequence[Addition]) -> Residuals:
+    return analyse(fit(make_problem(magnitudes, records, additions)))
+
+
+def _moved(shifts: tuple[Shift, ...], which: Sequence[int], samples: int) -> tuple[Shift, ...]:
+    by = [samples * one.period if k in which else 0.0 for k, one in enumerate(shifts)]
+    return tuple(one._replace(seconds=one.seconds + s) for one, s in zip(shifts, by, strict=True))
 
 
 def _stds(precision: np.ndarray, otherwise: Sequence[float]) -> Sequence[float]:

@@ -1,0 +1,183 @@
+"""The selection from where the motion begins, where a stated time zero may be what is wrong."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from crash_replay.recording import Recording
+
+from ...effects.effect import Addition, Effect
+from ...structure import Structure
+from ..observation.pace import at_its_own_pace
+from ..observation.record import ObservedRecord, observe
+from ..observation.rest import rests_of
+from ..parameterization.magnitudes import measure_magnitudes
+from ..residuals.residuals import Residuals, analyse
+from .acceptance import share_removed
+from .assumptions import CELLS, SelectionPath, first_believed, select
+from .candidates import candidates
+from .fitted_model import Model, fit_model
+from .rare_effects import common_effects
+from .thresholds import THRESHOLDS
+from .time_limit import out_of_time
+from .time_zero import Shift, TimeZero, moved_by, onsets, sharpened, time_zero_wrong
+
+
+class Begun(NamedTuple):
+    """What a selection has found, and from which time zeros."""
+
+    path: SelectionPath
+    zero: TimeZero | None = None  # None: all as stated
+    unused: tuple[Shift, ...] = ()  # onsets that are elsewhere, and that no recording is taken from
+
+
+def select_from_the_onset(
+    structure: Structure, recordings: Sequence[Recording], effects: Mapping[str, Effect]
+) -> Begun:
+    """What a structure lacks, from the stated time zeros on, or from where its motion begins, where that leaves less.
+
+    Raises ModelError or RecordingError where the data or the model is at fault.
+    """
+    search = _Search(structure, recordings, effects)
+    stated = search.from_early_onsets()
+    return search.from_sharper_onsets(stated) or stated
+
+
+@dataclass(frozen=True)
+class _Search:
+    structure: Structure
+    recordings: Sequence[Recording]
+    effects: Mapping[str, Effect]
+
+    def from_early_onsets(self) -> Begun:
+        """From the stated time zeros on, or from an onset where that comes first and the model leaves less so."""
+        records, elsewhere = self._observed(), onsets(self.recordings)
+        early = tuple(shift for shift in elsewhere if shift.seconds < -records[shift.recording].seen_early)
+        if early:
+            from_onset, common = self._observed(early), common_effects(self.structure, self.effects)
+            zero = time_zero_wrong(self.structure, records, from_onset, early, common)
+            if zero:
+                unused = tuple(shift for shift in elsewhere if shift not in early)
+                return Begun(self._selected(from_onset), zero, unused)
+        return Begun(self._selected(records), None, elsewhere)
+
+    def from_sharper_onsets(self, found: Begun) -> Begun | None:
+        """From the onsets, then from where the motion with the first effect that was found begins, then with another
+        law in its place: the first that leaves noise, as what was found does not, or does with more effects; or else
+        the one that leaves much less of more. Only from where next to nothing may be left."""
+        path, zero, unused = found
+        begins = onsets(self.recordings, as_well=True)
+        lacks_nothing = path.final.white and not (path.added or zero)
+        if lacks_nothing or not begins or (path.noise and not (zero or (unused and len(path.added) > 1))):
+            return None
+        used = {shift.recording: shift.seconds for shift in zero.shifts} if zero else {}
+        shifts = tuple(shift._replace(seconds=used.get(shift.recording, 0.0)) for shift in begins)
+        as_stated = zero.as_stated if zero else path.steps[0].before
+        most = len(path.added) - 1 if path.noise else THRESHOLDS.few  # effects that would be an improvement
+        tried: list[Begun] = []
+        asked: set[tuple[Callable, int]] = set()
+        for look in (self._at_onsets, self._sharper, self._sharper_by_other_laws, self._sharper_by_other_laws):
+            if out_of_time() or _left_by(path).mean_square >= THRESHOLDS.real_structure:
+                break
+            there = () if (look, id(path)) in asked else look(path, begins, shifts, most)
+            asked.add((look, id(path)))
+            if not there:
+                continue
+            tried.append(self._begun(there, as_stated))
+            if tried[-1].path.noise:
+                return (self._alone(tried[-1]) or tried[-1]) if len(tried[-1].path.added) <= most else None
+            if _left_by(tried[-1].path).mean_square < _left_by(path).mean_square:
+                path, shifts = tried[-1].path, there
+        return None if found.path.noise else _much_better(found.path, tried)
+
+    def _alone(self, found: Begun) -> Begun | None:
+        """One effect beside a time zero may make up for what that is off: what is found from where the motion of the
+        model as given begins, where that leaves as little and lacks nothing."""
+        return self.from_sharper_onsets(found) if found.zero and found.path.added else None
+
+    def _at_onsets(
+        self, path: SelectionPath, begins: tuple[Shift, ...], taken: tuple[Shift, ...], most: int
+    ) -> tuple[Shift, ...]:
+        """The onsets, where some are not where they were taken to be, and what was found leaves less from there on."""
+        pairs = zip(begins, taken, strict=True)
+        elsewhere = any(onset.differs and abs(onset.seconds - one.seconds) > onset.period for onset, one in pairs)
+        if path.noise or not elsewhere:
+            return ()
+        records = self._observed(begins)
+        magnitudes = measure_magnitudes(path.structure, records, CELLS)
+        there = fit_model(magnitudes, records, path.final.additions)
+        return begins if there.residuals.mean_square < _left_by(path).mean_square else ()
+
+    def _sharper(
+        self, path: SelectionPath, begins: tuple[Shift, ...], taken: tuple[Shift, ...], most: int,
+        others: Sequence[Sequence[Addition]] = (),
+    ) -> tuple[Shift, ...]:  # fmt: skip
+        """Where the motion with the first effect of a path begins, or with others in its place; none where that gains
+        too little."""
+        present = path.final.additions[: path.present]
+        choices = [(*present, *first) for first in (path.added[: min(most, 1)], *others)]
+        found = sharpened(begins, taken, path.structure, choices, self._observed, _left_by(path).rms)
+        saves = len(path.added) > 1 or most == 0  # one effect leaves as little as several
+        gains = found.of_residuals >= -THRESHOLDS.gain and (saves or found.gain > THRESHOLDS.gain)
+        return found.shifts if gains and found.mean_square < THRESHOLDS.near_floor else ()
+
+    def _sharper_by_other_laws(
+        self, path: SelectionPath, begins: tuple[Shift, ...], taken: tuple[Shift, ...], most: int
+    ) -> tuple[Shift, ...]:
+        """The same, where it leaves more than noise, with the laws that leave least from the onsets on."""
+        if path.noise or not any(onset.differs for onset in begins):
+            return ()
+        return self._sharper(path, begins, taken, most, self._others(path, begins))
+
+    def _others(self, path: SelectionPath, begins: Sequence[Shift]) -> list[Sequence[Addition]]:
+        """What a path may have begun with, had it been taken from the onsets: of all laws of the element on which one
+        explained most, those that leave least from there on."""
+        fitted = (one.addition for one in path.steps[0].as_recorded if one.fit)
+        element = next((one.target for one in fitted if one.effect.acts_on == "element"), None)
+        records, present = self._observed(begins), path.final.additions[: path.present]
+        magnitudes = measure_magnitudes(path.structure, records, CELLS)
+        laws: dict[tuple[str, str], Addition] = {}
+        for one in candidates(magnitudes, self.effects, present):
+            if one.target == element:
+                laws.setdefault((one.effect.name, one.variant), one)
+        models = [fit_model(magnitudes, records, (*present, law)) for law in laws.values()]
+        return [model.additions[len(present) :] for model in sorted(models, key=_rms)[: THRESHOLDS.few]]
+
+    def _begun(self, shifts: Sequence[Shift], as_stated: Model) -> Begun:
+        elsewhere = tuple(shift for shift in shifts if abs(shift.seconds) > shift.period)
+        path = self._selected(self._observed(shifts))
+        return Begun(path, TimeZero(elsewhere, as_stated) if elsewhere else None)
+
+    def _selected(self, records: Sequence[ObservedRecord]) -> SelectionPath:
+        return first_believed(select(self.structure, records, self.effects))
+
+    def _observed(self, shifts: Sequence[Shift] = ()) -> list[ObservedRecord]:
+        moved = [at_its_own_pace(self.structure, one) for one in moved_by(shifts, self.recordings)]
+        return [observe(self.structure, *each) for each in zip(moved, rests_of(moved), strict=True)]
+
+
+def _rms(model: Model) -> float:
+    return model.residuals.rms
+
+
+def _left_by(path: SelectionPath) -> Residuals:
+    """In the sensors' noise."""
+    return analyse(path.as_recorded)
+
+
+def _much_better(path: SelectionPath, others: Sequence[Begun]) -> Begun | None:
+    """One that leaves much less than a path from the stated time zeros, with as many effects at most: of those that
+    leave about the least the one that needs fewest."""
+    fair = [one for one in others if one.zero and len(one.path.added) <= max(len(path.added), 1)]
+    left = [_left_by(one.path) for one in fair]
+    least = min((one.mean_square for one in left), default=np.inf)
+    pairs = zip(fair, left, strict=True)
+    much = [
+        (len(one.path.added), there.mean_square, one)
+        for one, there in pairs
+        if share_removed(_left_by(path), there) > THRESHOLDS.least_share
+        and there.mean_square < least + THRESHOLDS.least_share
+    ]
+    return min(much, key=lambda each: each[:2])[2] if much else None
