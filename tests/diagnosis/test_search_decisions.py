@@ -276,3 +276,15 @@ def test_only_the_leader_goes_on_from_its_own_last_fit(monkeypatch, leader, has_
     )
     candidate_turns._fit(state, model(), None, addition, None)
     assert fits == (["on from its last"] if goes_on else [None])
+
+
+def test_a_candidate_is_not_taken_for_one_that_is_gone(monkeypatch):
+    """Its place in memory may be another's that was fitted before: then a run's answer hung on where objects lay."""
+    fitted = []
+    monkeypatch.setattr(candidate_fits, "fit", lambda *given: fitted.append(1))
+    monkeypatch.setattr(candidate_fits._Search, "_problem", lambda self, addition: None)
+    monkeypatch.setattr(candidate_fits._Search, "_note", lambda self, addition, found: None)
+    search = candidate_fits._Search(None, SimpleNamespace(fit=SimpleNamespace(cost=1.0), white=False), ())
+    for k in range(20):
+        search._fit(Addition(EFFECTS["unmodelled_body"], f"channel {k}"))
+    assert len(fitted) == 20

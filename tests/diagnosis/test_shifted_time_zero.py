@@ -200,6 +200,20 @@ def test_no_time_zero_is_sought_where_the_model_as_stated_leaves_noise(monkeypat
     assert onset_search._Search(None, (), {}).from_sharper_onsets(Begun(nothing, None, elsewhere)) is None
 
 
+@pytest.mark.parametrize(("moves", "rests"), [(0.0, True), (3.0, False)])
+def test_what_moves_before_an_onset_is_not_left_out(monkeypatch, moves, rests):
+    """100 samples from the stated time zero on, to an onset that is said to come 10 ms later; noise of 2 m/s^2."""
+    noise = 2.0 * np.random.default_rng(0).standard_normal((100, 1))
+    record = SimpleNamespace(
+        time=1e-4 * np.arange(100), at=np.arange(100), measured=noise + moves, noise=np.array([2.0]),
+        offset_std=np.array([0.1]),
+    )  # fmt: skip
+    monkeypatch.setattr(onset_search._Search, "_observed", lambda self: [record])
+    later = [Shift(0, "test", 1e-2, 1e-4, 1e-4)]
+    assert onset_search._Search(None, (), {})._rest_until(later) == rests
+    assert onset_search._Search(None, (), {})._rest_until([later[0]._replace(seconds=-1e-3)])
+
+
 LATE_OR_EARLY = {
     "sled/gap.both/1g/shifted/71880000": "an onset that is 2.4 ms late, and by its own account may be right",
     "side/rate.power/0.5g/shifted/71880037": "of one the signals begin before the stated time zero, of the other after",

@@ -93,7 +93,8 @@ class _Search:
     def __init__(self, magnitudes: Magnitudes, model: Model, screened: Sequence[Screened], least: float = np.inf):
         self.magnitudes, self.model, self.screened = magnitudes, model, screened
         self.least = min(model.fit.cost, least)
-        self.done: set[tuple[int, Schedule]] = set()
+        # the additions are kept: another one may get the id of one that is gone
+        self.done: dict[tuple[int, Schedule], Addition] = {}
         self.found: dict[tuple[str, str], CandidateFit] = {}
         for one in screened:
             self.found.setdefault(one.addition.key, CandidateFit(one.addition, one.gain, None, one))
@@ -190,7 +191,7 @@ class _Search:
     ) -> None:
         if (id(addition), schedule) in self.done or out_of_time():
             return
-        self.done.add((id(addition), schedule))
+        self.done[id(addition), schedule] = addition
         problem = self._problem(addition)
         start = start_from(self.model, problem, addition, screened) if screened else None
         hopeless = self.model.fit.cost if self.model.white else self.least + THRESHOLDS.hopeless

@@ -22,7 +22,7 @@ from .fitted_model import Model, fit_model
 from .rare_effects import common_effects
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
-from .time_zero import Shift, TimeZero, moved_by, onsets, sharpened, time_zero_wrong
+from .time_zero import FARTHEST, Shift, TimeZero, moved_by, onsets, sharpened, time_zero_wrong
 
 
 class Begun(NamedTuple):
@@ -77,13 +77,14 @@ class _Search:
         as_stated = zero.as_stated if zero else path.steps[0].before
         most = len(path.added) - 1 if path.noise else THRESHOLDS.few  # effects that would be an improvement
         tried: list[Begun] = []
-        asked: set[tuple[Callable, int]] = set()
+        asked: Callable | None = None
+        of: SelectionPath | None = None
         for look in (self._at_onsets, self._sharper, self._sharper_by_other_laws, self._sharper_by_other_laws):
             if out_of_time() or _left_by(path).mean_square >= THRESHOLDS.real_structure:
                 break
-            there = () if (look, id(path)) in asked else look(path, begins, shifts, most)
-            asked.add((look, id(path)))
-            if not there:
+            there = () if asked == look and of is path else look(path, begins, shifts, most)
+            asked, of = look, path
+            if not there or not self._rest_until(there):
                 continue
             tried.append(self._begun(there, as_stated))
             if tried[-1].path.noise:
@@ -144,6 +145,18 @@ class _Search:
                 laws.setdefault((one.effect.name, one.variant), one)
         models = [fit_model(magnitudes, records, (*present, law)) for law in laws.values()]
         return [model.additions[len(present) :] for model in sorted(models, key=_rms)[: THRESHOLDS.few]]
+
+    def _rest_until(self, shifts: Sequence[Shift]) -> bool:
+        """Whether the signals rest from the stated time zeros until then: what moves is not to be left out."""
+        stated = self._observed()
+        for shift in shifts:
+            record = stated[shift.recording]
+            before = record.measured[record.time[record.at] < shift.seconds]
+            if len(before) and np.isfinite(before).any(axis=0).all():
+                std = np.hypot(record.noise / np.sqrt(len(before)), record.offset_std)
+                if (np.abs(np.nanmean(before, axis=0)) > FARTHEST * std).any():
+                    return False
+        return True
 
     def _begun(self, shifts: Sequence[Shift], as_stated: Model) -> Begun:
         elsewhere = tuple(shift for shift in shifts if abs(shift.seconds) > shift.period)

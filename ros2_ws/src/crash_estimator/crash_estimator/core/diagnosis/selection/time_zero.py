@@ -36,7 +36,8 @@ BETWEEN = 12.0**-0.5
 """Standard deviation, in samples, of an instant between two of them."""
 
 FARTHEST = 2.0 * AS_WELL**0.5
-"""Standard deviations that an onset may be off: twice as far as any that fits its signals as well."""
+"""Standard deviations that an onset may be off: twice as far as any that fits its signals as well. And that a signal's
+mean may be off its zero where it is said to rest."""
 
 
 Observed: TypeAlias = "Callable[[Sequence[Shift]], Sequence[ObservedRecord]]"
