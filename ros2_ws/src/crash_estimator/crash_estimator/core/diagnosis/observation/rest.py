@@ -17,56 +17,52 @@ from ...noise_spectrum import Colour, colour_of
 from ...sensor_noise import ENOUGH
 
 
+class Quiet(NamedTuple):
+    """What one recording says."""
+
+    ends: int  # ns
+    period: int  # us, between samples
+    values: Mapping[tuple[str, str], np.ndarray]  # by quantity and channel, of those that rest; empty where too few
+
+
 class Rest(NamedTuple):
-    """Of one recording."""
+    """Of one recording, with what the others say."""
 
     ends: int  # ns
     colours: Mapping[str, Sequence[Colour]]
     """By channel, those that its noise may have: of all channels of its quantity in all recordings, and its own."""
 
 
-def rests_of(recordings: Sequence[Recording]) -> list[Rest]:
-    """Of recordings of one system; only those that are sampled alike say something of each other's colour."""
-    ends = [_rest_ends(recording) for recording in recordings]
-    by_period: dict[int, list[dict[str, np.ndarray]]] = {}
-    for recording, end in zip(recordings, ends, strict=True):
-        by_period.setdefault(_period(recording), []).append(_at_rest(recording, end))
-    colours = {period: _colours(rests, recordings[0]) for period, rests in by_period.items()}
-    return [Rest(end, colours[_period(recording)]) for recording, end in zip(recordings, ends, strict=True)]
-
-
-def _rest_ends(recording: Recording) -> int:
-    """Until when nothing moves, the stated time zero or an earlier onset; motion is no noise of a sensor's."""
+def quiet_of(recording: Recording) -> Quiet:
+    """Until the stated time zero, or an earlier onset; motion is no noise of a sensor's."""
     onset = find_onset(recording)
-    return min(0, onset.time_ns - onset.precision_ns) if onset and onset.differs else 0
-
-
-def _period(recording: Recording) -> int:
-    """us, between samples."""
-    return round(recording.sample_period * 1e6)
-
-
-def _at_rest(recording: Recording, end: int) -> dict[str, np.ndarray]:
-    """Values of the channels that rest, where there are enough of them."""
+    end = min(0, onset.time_ns - onset.precision_ns) if onset and onset.differs else 0
     quiet = recording.time_ns < end
-    if np.count_nonzero(quiet) < ENOUGH:
-        return {}
-    names = [channel.name for channel in recording.test.channels if channel.quantity in RESTS_AT_ZERO]
-    valid = [name for name in names if np.isfinite(recording.column(name)).any()]
-    return {name: bridged(recording, name)[quiet] for name in valid}
+    rests = (channel for channel in recording.test.channels if channel.quantity in RESTS_AT_ZERO)
+    values = {
+        (channel.quantity, channel.name): bridged(recording, channel.name)[quiet]
+        for channel in rests
+        if np.count_nonzero(quiet) >= ENOUGH and np.isfinite(recording.column(channel.name)).any()
+    }
+    return Quiet(end, round(recording.sample_period * 1e6), values)
 
 
-def _colours(rests: Sequence[Mapping[str, np.ndarray]], first: Recording) -> dict[str, Sequence[Colour]]:
-    quantity = {channel.name: channel.quantity for channel in first.test.channels}
-    alike: dict[str, list[str]] = {}
-    for name in dict.fromkeys(name for rest in rests for name in rest):
-        alike.setdefault(quantity.get(name, name), []).append(name)
-    found: dict[str, Sequence[Colour]] = {}
-    for names in alike.values():
-        of_each = {name: [rest[name] for rest in rests if name in rest] for name in names}
-        of_all = colour_of([rest for each in of_each.values() for rest in each])
-        found |= {name: (of_all, colour_of(each)) for name, each in of_each.items()}
-    return found
+def rest_of(one: Quiet, others: Sequence[Quiet] = ()) -> Rest:
+    """Others of the same system; only those that are sampled alike say something of its noise's colour."""
+    alike = [one, *(other for other in others if other.period == one.period)]
+    colours: dict[str, Sequence[Colour]] = {}
+    for quantity in dict.fromkeys(quantity for quantity, _ in one.values):
+        rests = [(name, rest) for each in alike for (what, name), rest in each.values.items() if what == quantity]
+        of_all = colour_of([rest for _, rest in rests])
+        for name in dict.fromkeys(name for name, _ in rests):
+            colours[name] = of_all, colour_of([rest for its, rest in rests if its == name])
+    return Rest(one.ends, colours)
+
+
+def rests_of(recordings: Sequence[Recording]) -> list[Rest]:
+    """Of recordings of one system."""
+    each = [quiet_of(recording) for recording in recordings]
+    return [rest_of(one, [*each[:k], *each[k + 1 :]]) for k, one in enumerate(each)]
 
 
 def bridged(recording: Recording, name: str) -> np.ndarray:

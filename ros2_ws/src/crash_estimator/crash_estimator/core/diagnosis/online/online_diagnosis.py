@@ -20,7 +20,7 @@ from ...kinematics import Kinematics
 from ...structure import EffectSpec, Structure
 from ..observation.bin_means import in_bins
 from ..observation.record import FEWEST_SAMPLES, ObservedRecord, observe
-from ..observation.rest import rests_of
+from ..observation.rest import Quiet, quiet_of, rest_of, rests_of
 from ..output_error.gauss_newton import fit
 from ..output_error.problem import make_problem
 from ..parameterization.layout import Layout
@@ -55,11 +55,13 @@ class OnlineDiagnosis:
     effects: Mapping[str, Effect] = field(default_factory=lambda: EFFECTS)
     budget: float = BUDGET  # s of the processor's time in an update after which it begins no further candidate
     other_records: Sequence[ObservedRecord] = field(init=False)
+    other_rests: Sequence[Quiet] = field(init=False)
 
     def __post_init__(self):
         Kinematics(self.structure, self.test)
         others = zip(self.others, rests_of(self.others), strict=True)
         object.__setattr__(self, "other_records", [observe(self.structure, *other) for other in others])
+        object.__setattr__(self, "other_rests", [quiet_of(other) for other in self.others])
 
     def init(self) -> OnlineState:
         return OnlineState()
@@ -69,7 +71,8 @@ class OnlineDiagnosis:
         if np.count_nonzero(recording.time_ns >= 0) < FEWEST_SAMPLES:
             return state, None
         out_of_time = _clock(self.budget)
-        full = [observe(self.structure, recording, rests_of([recording, *self.others])[0]), *self.other_records]
+        rest = rest_of(quiet_of(recording), self.other_rests)
+        full = [observe(self.structure, recording, rest), *self.other_records]
         records = [in_bins(record) for record in full]
         magnitudes = measure_magnitudes(
             self.structure, records, min(CELLS, CELLS_IN_ALL // len(self.structure.elements))
