@@ -11,7 +11,7 @@ from crash_estimator.core.diagnosis.output_error.continuation import FROM_SIMULA
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 from crash_estimator.core.diagnosis.report.diagnosis import diagnose
 from crash_estimator.core.diagnosis.residuals.in_band import in_band
-from crash_estimator.core.diagnosis.residuals.residuals import free_run
+from crash_estimator.core.diagnosis.residuals.residuals import analyse, free_run
 from crash_estimator.core.diagnosis.selection import pruning
 from crash_estimator.core.diagnosis.selection.acceptance import better
 from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
@@ -50,6 +50,19 @@ def searched():
     """Steps and the last model of a case that the vocabulary cannot explain."""
     magnitudes, given = fitted(*ROTATING_IMPACTOR)
     return forward_selection(magnitudes, EFFECTS, given, first_step(magnitudes, EFFECTS, given))
+
+
+@pytest.mark.parametrize("from_on", [0, -50])
+@pytest.mark.parametrize("without_bounds", [np.nan, np.inf])
+def test_a_motion_without_bounds_leaves_much(without_bounds, from_on):
+    """As no number it would be left out, and what is left of nothing is within any tolerance."""
+    _, model = fitted(*ROTATING_DOOR)
+    motion = model.fit.trajectories[0]
+    x, v = motion.x.copy(), motion.v.copy()
+    x[from_on:] = v[from_on:] = without_bounds
+    left = analyse(model.fit._replace(trajectories=(motion._replace(x=x, v=v),)))
+    assert np.isfinite(left.rms) and left.rms > 10.0 * model.residuals.rms
+    assert left.mean_square > 100.0 * model.residuals.mean_square and not left.white
 
 
 def test_what_a_model_leaves_as_given_is_what_its_own_simulation_leaves():

@@ -56,3 +56,15 @@ def test_what_the_element_does_meanwhile_is_told(apart, unloads, state):
     left = np.zeros(SAMPLES)
     left[800:1200] = 10.0 * NOISE
     assert [window.state for window in windows(left, apart, unloads)] == [state]
+
+
+def test_where_nothing_is_valid_nothing_fails():
+    """Between two loud samples, neither of which fails by itself, lies a clipped stretch: a window there sees both."""
+    length = int(round(module.WINDOW / DT))
+    loud = np.zeros(SAMPLES)
+    loud[[799, 800 + length - 3]] = 6.0 * NOISE
+    beside = loud.copy()
+    beside[800] = beside[799]
+    assert windows(beside)
+    loud[800 : 800 + length - 3] = np.nan
+    assert not windows(loud)

@@ -21,20 +21,22 @@ CARE = ["slowly", "other_variants", "anew", "profile"]
 
 
 @pytest.mark.parametrize(
-    ("out_of_reach", "explains_most", "earlier", "tried"),
+    ("out_of_reach", "explains_most", "earlier", "left", "tried"),
     [
-        (False, True, (), CARE),
-        (False, False, (), CARE[:3]),
-        (True, False, (), CARE[:3]),
-        (True, True, (), []),
-        (True, False, ("one",), []),
-        (False, False, ("one",), []),
-        (False, True, ("one",), CARE),
+        (False, True, (), 50.0, CARE),
+        (False, False, (), 50.0, CARE[:1]),
+        (False, False, (), 150.0, CARE[:3]),
+        (True, False, (), 150.0, CARE[:3]),
+        (True, True, (), 150.0, []),
+        (True, False, ("one",), 150.0, []),
+        (False, False, ("one",), 150.0, []),
+        (False, True, ("one",), 50.0, CARE),
     ],
 )
 def test_care_is_taken_within_reach_of_noise_and_with_a_further_effect_or_a_profile_where_most_is_explained(
-    monkeypatch, out_of_reach, explains_most, earlier, tried
+    monkeypatch, out_of_reach, explains_most, earlier, left, tried
 ):
+    """And less of what explains less, but of a real structure."""
     called = []
 
     class Search:
@@ -56,7 +58,8 @@ def test_care_is_taken_within_reach_of_noise_and_with_a_further_effect_or_a_prof
     monkeypatch.setattr(candidate_fits, "candidates", lambda *given: ())
     monkeypatch.setattr(candidate_fits, "screen", lambda *given: [])
     monkeypatch.setattr(candidate_fits, "out_of_time", lambda: False)
-    assert candidate_fits.fit_candidates(None, {}, model(), thorough=True, earlier=earlier) == tried
+    before = model(mean_square=left)
+    assert candidate_fits.fit_candidates(None, {}, before, thorough=True, earlier=earlier) == tried
 
 
 @pytest.mark.parametrize(("white", "asked"), [(False, ["hardly screened", "with care"]), (True, ["hardly screened"])])
@@ -111,13 +114,17 @@ def test_the_first_effect_of_a_path_was_followed_where_a_second_was_fitted_besid
     assert followed == [None, None, one.key]
 
 
-def test_what_was_followed_one_by_one_is_not_followed_again_in_a_pair(monkeypatch):
+def test_what_was_followed_one_by_one_or_explains_too_little_is_not_followed_in_a_pair(monkeypatch):
     tried = []
     monkeypatch.setattr(pair_search, "analyse", lambda fit: SimpleNamespace(mean_square=2.0))
     monkeypatch.setattr(pair_search, "on_trial", lambda m, mod, first: tried.append(first.addition.key) or (m, mod))
     monkeypatch.setattr(pair_search, "cost_of_noise", lambda records: 0.0)
     monkeypatch.setattr(pair_search, "fit_candidates", lambda *given, least: [])
-    found = [candidate(900.0, ("friction", "a")), candidate(800.0, ("damping", "a"))]
+    little = {("stop", "a"): True}
+    monkeypatch.setattr(pair_search, "as_fitted", lambda mod, one: one.addition.key)
+    monkeypatch.setattr(pair_search, "band_of", lambda *given: None)
+    monkeypatch.setattr(pair_search, "explains_too_little", lambda before, key, band: little.get(key, False))
+    found = [candidate(900.0, ("friction", "a")), candidate(800.0, ("damping", "a")), candidate(700.0, ("stop", "a"))]
     assert pair_search.two_at_once(MAGNITUDES, {}, model(), found, [], ("friction", "a")) is None
     assert tried == [("damping", "a")]
 
@@ -179,6 +186,7 @@ def test_a_search_out_of_time_has_looked_at_all_candidates_once(monkeypatch):
     monkeypatch.setattr(forward_selection, "common_effects", lambda *given: {})
     monkeypatch.setattr(forward_selection, "_next_step", lambda *given: step)
     monkeypatch.setattr(forward_selection, "with_rare_ones", lambda m, e, first, found: first)
+    monkeypatch.setattr(forward_selection, "_none_leads", lambda step: False)
     monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done, path, evenly: done)
     monkeypatch.setattr(forward_selection, "better", lambda one, other: False)
     monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final, present: (path, final))

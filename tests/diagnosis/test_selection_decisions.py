@@ -98,6 +98,7 @@ def test_an_effect_on_two_elements_is_tried_on_both(monkeypatch, together, pairs
     given = model(100.0)
     one, other = (step(given).candidates[0] for _ in range(2))
     monkeypatch.setattr(pair_search, "as_fitted", lambda *given: model(50.0, 1))
+    monkeypatch.setattr(pair_search, "_leading", lambda mod, candidates: candidates)
     monkeypatch.setattr(pair_search, "fit_model", lambda *given: model(1.0, 2, evidence=together))
     found = pair_search.two_of_one_effect(SimpleNamespace(), given, [one, other])
     assert len(found) == pairs
@@ -169,6 +170,43 @@ def test_what_explains_too_little_is_not_added_and_nothing_after_it(monkeypatch)
     assert len(final.additions) == 1 and final is path[1].before and len(path) == 2 and not told
 
 
+none_leads = forward_selection._none_leads
+
+
+@pytest.fixture(autouse=True)
+def any_leads(monkeypatch):
+    monkeypatch.setattr(forward_selection, "_none_leads", lambda step: False)
+
+
+@pytest.mark.parametrize(("leads", "added"), [([False, False], 0), ([False, True], 2), ([True], 2)])
+def test_where_none_leads_in_the_sensors_noise_nor_in_a_larger_one_nothing_is_added(monkeypatch, leads, added):
+    asked = iter(leads)
+    monkeypatch.setattr(forward_selection, "_none_leads", lambda step: not next(asked))
+    path, final = one_by_one(monkeypatch, 1e3, step)
+    assert len(final.additions) == len(path) - 1 == added and not list(asked)
+
+
+@pytest.mark.parametrize(
+    ("left", "noise", "shares", "none"),
+    [
+        (50.0, False, (0.1, 0.4), True),
+        (50.0, False, (0.1, 0.6), False),
+        (50.0, True, (0.1, 0.4), False),
+        (500.0, False, (0.1, 0.4), False),
+        (1.5, False, (0.1, 0.4), False),
+    ],
+)
+def test_what_explains_half_may_lead_and_anything_near_noise_or_of_a_real_structure(
+    monkeypatch, left, noise, shares, none
+):
+    monkeypatch.setattr(SelectionStep, "leaves_noise", noise)
+    monkeypatch.setattr(forward_selection, "band_of_steps", lambda steps: None)
+    monkeypatch.setattr(forward_selection, "as_fitted", lambda before, one: one)
+    monkeypatch.setattr(forward_selection, "share_explained", lambda before, share, band: share.gain)
+    candidates = [CandidateFit(None, share, "fitted") for share in shares] + [CandidateFit(None, 0.9, None)]
+    assert none_leads(SelectionStep(model(left), candidates)) == none
+
+
 def one_by_one(
     monkeypatch,
     left: float,
@@ -191,7 +229,7 @@ def one_by_one(
     monkeypatch.setattr(forward_selection, "_all_explain_too_little", hopeless)
     monkeypatch.setattr(forward_selection, "with_rare_ones", with_rare_ones)
     monkeypatch.setattr(forward_selection, "elsewhere_than", lambda rare, step: step)
-    monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done, path, evenly: done)
+    monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done, *path, **noises: done)
     monkeypatch.setattr(forward_selection, "_without", lambda model, found: model)
     monkeypatch.setattr(
         forward_selection,

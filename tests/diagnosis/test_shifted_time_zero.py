@@ -154,9 +154,19 @@ def test_a_sharper_time_zero_must_leave_less_than_all_that_was_found_without_it(
 def test_what_the_onsets_alone_speak_for_is_no_gain_of_what_is_left(monkeypatch):
     """The model leaves more from the onset on, which is known to 0.1 ms, than from the stated time zero."""
     onset = Shift(0, "test", 3e-3, 1e-4, 1e-4)
-    leaving(monkeypatch, lambda seconds: 1.0 + 1e3 * seconds)
+    leaving(monkeypatch, lambda seconds: 1.0 + 0.5e3 * seconds)
     found = sharpened([onset], [onset._replace(seconds=0.0)], None, [[]], begun, 1.0)
     assert found.gain > 0.0 > found.of_residuals
+
+
+@pytest.mark.parametrize(("coarsely", "closer"), [(1.5, True), (4.0, False)])
+def test_where_much_more_than_noise_is_left_about_an_onset_no_closer_look_is_taken(monkeypatch, coarsely, closer):
+    """m/s^2, in a noise of 1: in 0.8 ms steps about an onset that may be 1 ms off."""
+    onset = Shift(0, "test", 3e-3, 1e-3, 1e-4)
+    leaving(monkeypatch, lambda seconds: coarsely)
+    monkeypatch.setattr(time_zero, "_with_care", lambda *given: left(0.9))
+    found = sharpened([onset], [onset], None, [[]], begun, 5.0)
+    assert (found is not None) == closer
 
 
 @pytest.fixture(scope="module")

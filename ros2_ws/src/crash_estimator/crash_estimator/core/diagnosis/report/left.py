@@ -7,14 +7,10 @@ import numpy as np
 from ...rating import rate
 from ..observation.whitening import filtered
 from ..output_error.normal_equations import may_diverge
-from ..parameterization.layout import Layout
+from ..parameterization.layout import BEYOND_DOUBT, Layout
 from ..residuals.in_band import InBand, in_band, in_class, noise_in_class
 from ..residuals.residuals import rms
 from ..selection.fitted_model import Model
-
-HEARD = 3.0
-"""Standard deviations of the noise in the band: a channel whose peak is below has nothing to compare. The usual
-three sigma; halved and doubled it changed nothing of what 36 looked-at cases were told."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +79,7 @@ def _channels(
     found = []
     for q, output in enumerate(layout.outputs):
         peak, size = float(np.abs(measured[:, q]).max()), float(np.sqrt(np.mean(left[:, q] ** 2)))
-        if peak > HEARD * floor[q]:
+        if peak > BEYOND_DOUBT * floor[q]:  # else there is nothing to compare
             rating = _rating(measured[:, q], measured[:, q] - left[:, q])
             found.append(ChannelLeft(output.channel, recording, size, output.unit, size / peak, rating))
     return found

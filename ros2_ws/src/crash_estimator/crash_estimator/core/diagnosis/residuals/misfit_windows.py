@@ -41,6 +41,7 @@ def misfit_windows(layout: Layout, records: Sequence[ObservedRecord], residuals:
             z2 = np.nan_to_num(residual / residuals.noise[r][q]) ** 2
             mean = np.convolve(z2, np.full(length, 1.0 / length), "same")
             outside = mean > chdtri(length, SIGNIFICANT / tests) / length  # a sum of squares: chi-squared
+            outside &= np.isfinite(residual)
             for first, last in _runs(outside, length):
                 within = slice(first, last + 1)
                 found.append(

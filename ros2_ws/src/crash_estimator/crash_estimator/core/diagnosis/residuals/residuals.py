@@ -18,6 +18,10 @@ from ..parameterization.experiment import Experiment
 from ..parameterization.layout import Layout
 from .band_test import Absorbed, BandTest, band_test, band_test_of_fit
 
+UNBOUNDED = 1e3
+"""Times the largest value measured, as which a prediction counts that is beyond, or no number: whatever is asked of it,
+a motion without bounds is far off. Not varied: no bounded one leaves a hundredth of that."""
+
 
 class Residuals(NamedTuple):
     """Residuals of one model on all records."""
@@ -94,7 +98,9 @@ def _residuals(problem: OutputErrorProblem, point: Point, equations: Sequence[Eq
     outputs, residuals = [], []
     for experiment, each, trajectory in zip(problem.experiments, equations, point.trajectories, strict=True):
         record = experiment.record
-        output = predicted(experiment, theta, each.rows, trajectory)[record.at]
+        limit = UNBOUNDED * np.nanmax(np.abs(record.measured), axis=0)
+        output = np.nan_to_num(predicted(experiment, theta, each.rows, trajectory)[record.at], nan=np.inf)
+        output = np.clip(output, -limit, limit)
         outputs.append(output)
         residuals.append(np.where(record.valid[record.at] > 0.0, record.measured - output, np.nan))
     links = tuple(each.links for each in equations)

@@ -60,9 +60,13 @@ def explains_too_little(before, after, cfc: int | None) -> bool:
 
     before, after: the model (a `Model` each) without it and with it, as their errors are told; cfc: the band's class.
     """
+    return share_explained(before, after, cfc) < THRESHOLDS.least_share
+
+
+def share_explained(before, after, cfc: int | None) -> float:
+    """Of what the model before (a `Model` each) leaves, of all that is sampled or in the band, whichever is more."""
     left, without = (in_band(one.fit, one.residuals, cfc) for one in (after, before))
-    shares = left.share_explained(without), share_removed(before.residuals, after.residuals)
-    return max(shares) < THRESHOLDS.least_share
+    return max(left.share_explained(without), share_removed(before.residuals, after.residuals))
 
 
 def needed_gain(white: bool, found: int) -> float:

@@ -69,15 +69,15 @@ def fit_candidates(
             bend = [a for a in bend if a.key not in tried]
         search.from_motion(Screened(a, 0.0, 0.0, 1.0) for a in bend)
     if thorough and not model.white:
-        for harder in (search.slowly, search.other_variants, search.anew, search.profile):
-            if out_of_time():
-                break
-            if search.reached_the_floor():
+        ways = search.slowly, search.other_variants, search.anew, search.profile
+        of_little = ways[: 3 if model.residuals.mean_square >= THRESHOLDS.real_structure else 1]
+        for harder in ways:
+            if out_of_time() or search.reached_the_floor():
                 break
             if search.explains_most():
                 if search.out_of_reach():
                     break
-            elif earlier or harder == search.profile:
+            elif earlier or harder not in of_little:
                 break
             harder()
     if thorough and not out_of_time() and search.reached_the_floor():

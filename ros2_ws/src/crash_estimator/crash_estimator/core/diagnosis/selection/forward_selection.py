@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from ...effects.effect import Addition, Effect
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
-from .acceptance import better, explains_too_little, needed_gain, share_removed
+from .acceptance import better, explains_too_little, needed_gain, share_explained, share_removed
 from .candidate_fits import CandidateFit
 from .even_fit import evenly_fitted
 from .fitted_model import Model
@@ -68,6 +68,10 @@ def _one_by_one(
             found = model.additions[present:]
             if _takes_a_rare_one(found):
                 first = with_rare_ones(magnitudes, effects, first, found)
+        if not path and _none_leads(first):
+            once = weighed(magnitudes, common, first, noises=1)
+            if _none_leads(once):
+                return [once], once.before
         done, first = weighed(magnitudes, common, first, path, evenly), None
         path.append(done)
         fair = _without(model, done.best) if done.best and done.before is model else model
@@ -97,6 +101,16 @@ def _explains_nearly_all(step: SelectionStep) -> bool:
     """The best candidate does: what it leaves may be of another kind as well as of its own."""
     left = step.best and share_removed(step.before.residuals, analyse(step.best.fit))
     return bool(left and left > THRESHOLDS.all_but_folds)
+
+
+def _none_leads(step: SelectionStep) -> bool:
+    """Whether no candidate explains so much that it could be named, or lead to what could: two at once still may."""
+    before, band = step.before, band_of_steps([step])
+    far = THRESHOLDS.near_floor <= before.residuals.mean_square < THRESHOLDS.real_structure
+    if step.leaves_noise or not far:
+        return False
+    fitted = (as_fitted(before, one) for one in step.candidates if one.fit)
+    return all(share_explained(before, larger, band) < THRESHOLDS.leading_share for larger in fitted)
 
 
 def _next_step(

@@ -20,6 +20,7 @@ from .assumptions import CELLS, SelectionPath, first_believed, select
 from .candidates import candidates
 from .fitted_model import Model, fit_model
 from .rare_effects import common_effects
+from .selection_step import as_found
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
 from .time_zero import FARTHEST, Shift, TimeZero, moved_by, onsets, sharpened, time_zero_wrong
@@ -115,11 +116,14 @@ class _Search:
         self, path: SelectionPath, begins: tuple[Shift, ...], taken: tuple[Shift, ...], most: int,
         others: Sequence[Sequence[Addition]] = (),
     ) -> tuple[Shift, ...]:  # fmt: skip
-        """Where the motion with the first effect of a path begins, or with others in its place; none where that gains
-        too little."""
-        present = path.final.additions[: path.present]
-        choices = [(*present, *first) for first in (path.added[: min(most, 1)], *others)]
+        """Where the motion with the first effect of a path begins, or what came nearest to one, or with others in its
+        place; none where that gains too little."""
+        present, best = path.final.additions[: path.present], path.steps[0].best
+        first = path.added[:1] or ([as_found(best)] if best else [])
+        choices = [(*present, *one) for one in (first[: min(most, 1)], *others)]
         found = sharpened(begins, taken, path.structure, choices, self._observed, _left_by(path).rms)
+        if found is None:
+            return ()
         saves = len(path.added) > 1 or most == 0  # one effect leaves as little as several
         gains = found.of_residuals >= -THRESHOLDS.gain and (saves or found.gain > THRESHOLDS.gain)
         return found.shifts if gains and found.mean_square < THRESHOLDS.near_floor else ()

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 from ...effects.effect import Addition, Effect
 from ..parameterization.magnitudes import Magnitudes
+from ..residuals.in_band import band_of
 from ..residuals.residuals import analyse
-from .acceptance import cost_of_noise, share_removed
+from .acceptance import cost_of_noise, explains_too_little, share_removed
 from .candidate_fits import CandidateFit, fit_candidates
 from .fitted_model import Model, fit_model
 from .selection_step import SelectionStep, added, as_fitted, on_trial
@@ -45,7 +46,7 @@ def two_of_one_effect(magnitudes: Magnitudes, model: Model, candidates: Sequence
     for one in candidates:
         if one.addition.effect.acts_on == "element":
             alike.setdefault(one.addition.effect.name, []).append(one)
-    several = [places for places in alike.values() if len(places) > 1 and _likely(places[:1])]
+    several = [places for places in alike.values() if len(places) > 1 and _leading(model, places[:1])]
     found = []
     for first, *others in several[: THRESHOLDS.shortlist]:
         larger = as_fitted(model, first)
@@ -101,9 +102,15 @@ def _likely(candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
     return [one for one in candidates if one.fit and one.gain > THRESHOLDS.gain_in_pair]
 
 
+def _leading(model: Model, candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
+    """The likely ones that explain not too little to be one of two."""
+    band = band_of(model.records, model.residuals)
+    return [one for one in _likely(candidates) if not explains_too_little(model, as_fitted(model, one), band)]
+
+
 def _one_after_the_other(magnitudes: Magnitudes, effects, model: Model, candidates, followed) -> Iterator[Pair]:
     """The likeliest first ones, each with the best second one."""
-    for first in _likely(candidates)[: THRESHOLDS.few]:
+    for first in _leading(model, candidates)[: THRESHOLDS.few]:
         if first.addition.key == followed or analyse(first.fit).mean_square >= THRESHOLDS.real_structure:
             continue
         wider, larger = on_trial(magnitudes, model, first)

@@ -68,17 +68,18 @@ def only_screened(magnitudes: Magnitudes, effects: Mapping[str, Effect], model: 
 
 def weighed(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], done: SelectionStep, path: Sequence[SelectionStep] = (),
-    evenly: Model | None = None,
+    evenly: Model | None = None, noises: int = THRESHOLDS.few,
 ) -> SelectionStep:  # fmt: skip
     """The step as it is where only noise is left, else against what the best candidate leaves.
 
-    path: the steps before; evenly: the model before it, as it was fitted with all outputs alike.
+    path: the steps before; evenly: the model before it, as it was fitted with all outputs alike; noises: so many at
+    most, each as large as what the best candidate leaves in the one before.
     """
     model, found = done.before, done.candidates
     if done.leaves_noise:
         return done
     fits = {one.addition.key for one in found if one.fit}
-    for _ in range(THRESHOLDS.few):
+    for _ in range(noises):
         larger = done.before is not model
         if out_of_time() or (larger and done.best is None):  # nothing counts: in a larger noise yet, still less does
             break
