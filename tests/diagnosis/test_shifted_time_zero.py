@@ -107,6 +107,13 @@ def test_what_makes_up_for_a_time_zero_that_is_off_is_not_told_beside_it():
     assert abs(zero.coefficient - late) < 3e-4
 
 
+def test_a_fit_gone_astray_makes_no_time_zero_wrong():
+    """Slow noise looks like an onset, and the first fit of the right model leaves five times the noise from either."""
+    case = drawn_of_second(of_second("cab/nothing/1g/coloured/46000295"))
+    found = diagnose(ModelFile.model_validate(yaml.safe_load(case.model_text)).structure(), case.recordings)
+    assert found.verdict == "adequate" and "the signals begin -1.6 ms (cab 2)" in found.text, found.text
+
+
 def begun(shifts):
     """A record that begins where the first of the shifts says."""
     return [SimpleNamespace(bins=100, measured=np.zeros((1, 1)), at=shifts[0].seconds)]

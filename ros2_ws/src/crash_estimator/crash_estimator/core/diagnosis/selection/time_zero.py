@@ -28,7 +28,7 @@ from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
 from ..parameterization.model_terms import additions_of
 from ..residuals.residuals import Residuals, analyse, rms
 from .assumptions import CELLS
-from .fitted_model import Model, fit_model
+from .fitted_model import Model, fit_given, fit_model
 from .thresholds import THRESHOLDS
 from .time_limit import out_of_time
 
@@ -116,7 +116,7 @@ def time_zero_wrong(
 
     def given(records: Sequence[ObservedRecord]) -> Model:
         magnitudes = measure_magnitudes(structure, records, CELLS)
-        return fit_model(magnitudes, records, additions_of(structure, magnitudes, effects))
+        return fit_given(magnitudes, records, additions_of(structure, magnitudes, effects))
 
     zero = TimeZero(shifts, given(stated))
     return zero if not zero.as_stated.white and zero.gain(given(moved)) > THRESHOLDS.gain else None
