@@ -1,0 +1,20 @@
+"""Models and steps of a selection whose fits are made up."""
+
+from types import SimpleNamespace
+
+from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
+from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
+
+
+def model(left: float, additions: int = 0, evidence: float = 0.0) -> SimpleNamespace:
+    """One that leaves a mean square of residuals, in the variance of the noise, with so many additions."""
+    fit = SimpleNamespace(problem=SimpleNamespace(noise_is_inflated=False), evidence=evidence, additions=additions)
+    residuals = SimpleNamespace(mean_square=left)
+    return SimpleNamespace(
+        roughness=None, fit=fit, residuals=residuals, white=left < 1.1, additions=("one",) * additions, records=()
+    )
+
+
+def step(before: SimpleNamespace, gain: float = 500.0) -> SelectionStep:
+    addition = SimpleNamespace(effect=SimpleNamespace(name="friction", acts_on="element"), key=("friction", "spring"))
+    return SelectionStep(before, [CandidateFit(addition, gain, SimpleNamespace(evidence=gain))])
