@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from crash_estimator.benchmarks.effects_judge import drawn as drawn_case
 from crash_estimator.benchmarks.effects_plan import case_of
 from crash_estimator.core.diagnosis import diagnose
-from crash_estimator.core.diagnosis.selection import rare_effects, selection_step
+from crash_estimator.core.diagnosis.selection import pair_search, rare_effects, selection_step
 from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
 from crash_estimator.core.diagnosis.selection.rare_effects import (
     common_effects,
@@ -89,6 +89,44 @@ def test_a_rare_effect_is_named_beside_a_common_one(structure, common, rare):
     assert {(step.effect, step.target) for step in found.steps} == {(one.effect, one.target) for one in hidden}
 
 
+def named(name: str) -> list[tuple[str, str]]:
+    """What is named of a simulated case that was looked at."""
+    _, structure, recordings = drawn_case(case_of(name))
+    found = diagnose(structure, recordings)
+    return [(step.effect, step.target) for step in found.steps] if found.verdict == "effect_missing" else []
+
+
+@pytest.mark.parametrize(
+    ("name", "element"),
+    [
+        ("side/maxwell_element/1/1g/10000Hz/0.75,1.1/17000480", "mdb_door"),
+        ("frontal/maxwell_element/1/2g/10000Hz/0.75,1.1/17000679", "engine_barrier"),
+    ],
+)
+def test_a_rare_effect_is_named_where_the_best_common_one_leaves_four_times_as_much(name, element):
+    """Rate hardening leaves 1.4 and 1.5 of the noise, what relaxes 1.04 and, with contacts as they are, noise."""
+    assert named(name) == [("maxwell_element", element)]
+
+
+def test_a_rare_effect_that_leaves_less_than_all_common_ones_leads_to_a_pair():
+    pair = named("frontal/channel_gain+maxwell_element/1/1g/10000Hz/0.75,1.1/17000330")
+    assert pair == [("maxwell_element", "engine_barrier"), ("channel_gain", "engine_ax")]
+
+
+@pytest.mark.parametrize(("first", "common_only"), [("maxwell_element", True), ("cubic_stiffness", False)])
+def test_beside_a_rare_effect_a_second_one_is_looked_for_among_the_common_ones(monkeypatch, first, common_only):
+    asked = []
+    leads = CandidateFit(Addition(EFFECTS[first], "mount"), 1e3, SimpleNamespace(cost=0.0))
+    fit = SimpleNamespace(layout=SimpleNamespace(structure=SimpleNamespace(effects=())))
+    monkeypatch.setattr(pair_search, "_leading", lambda model, candidates: candidates)
+    monkeypatch.setattr(pair_search, "analyse", lambda fit: SimpleNamespace(mean_square=2.0))
+    monkeypatch.setattr(pair_search, "on_trial", lambda magnitudes, model, first: (magnitudes, model))
+    monkeypatch.setattr(pair_search, "fit_candidates", lambda m, effects, *given, least: asked.append(effects) or [])
+    assert pair_search.two_at_once(None, EFFECTS, SimpleNamespace(fit=fit, records=()), [leads], [], None) is None
+    (effects,) = asked
+    assert effects == (common_effects(fit.layout.structure, EFFECTS) if common_only else EFFECTS)
+
+
 @pytest.mark.parametrize("effect", ["viscous_damping", "cubic_stiffness"])
 def test_a_common_effect_stays_named(effect):
     model, recordings, _ = case("impactor", effect)
@@ -100,6 +138,9 @@ def test_none_is_tried_where_nothing_is_missing():
     model, recordings, _ = case("impactor")
     found = diagnose(model, recordings)
     assert found.verdict == "adequate" and not RARE & {ranked.effect for ranked in found.ranking}
+
+
+RECORD = SimpleNamespace(below=np.inf, bins=1000, measured=np.zeros((1000, 1)))
 
 
 def fitted(name: str, cost: float) -> CandidateFit:
@@ -121,7 +162,8 @@ def left(fit) -> SimpleNamespace:
         (1e4, 9e3, [False, True], "friction"),  # less than the common one, but no noise: tried with care
         (1e4, 2e4, [False], "friction"),
         (1e4, 1.2e3, [False, True], "gas_cushion"),  # less than the noise again is left, of hundred times as much
-        (1.9e3, 1.2e3, [False, True], "friction"),  # a common one comes as near
+        (1.9e3, 1.4e3, [False, True], "friction"),  # a common one comes as near
+        (1.9e3, 1.2e3, [False, True], "gas_cushion"),  # or not quite: three quarters of what it leaves are explained
     ],
 )
 def test_a_rare_effect_comes_into_the_ranking_where_it_leaves_noise_or_next_to_nothing_else(
@@ -138,27 +180,30 @@ def test_a_rare_effect_comes_into_the_ranking_where_it_leaves_noise_or_next_to_n
     for module in (selection_step, rare_effects):
         monkeypatch.setattr(module, "analyse", left)
     fit = SimpleNamespace(cost=1e5)
-    model = SimpleNamespace(white=False, fit=fit, residuals=left(fit), records=[SimpleNamespace(below=np.inf)])
+    model = SimpleNamespace(white=False, fit=fit, residuals=left(fit), records=[RECORD])
     step = SelectionStep(model, [fitted("friction", cost=left_by_common)])
     magnitudes = SimpleNamespace(structure=SimpleNamespace(effects=()))
     found = with_rare_ones(magnitudes, EFFECTS, step)
     assert tried == asked and found.best.addition.key[0] == leads
-    assert (found is step) == (leads == "friction" and left_by_rare >= 1.1e3)  # what is not believed is not told
+    believed = leads == "gas_cushion" or left_by_rare < 1.1e3
+    assert (found.candidates == step.candidates) != believed  # what is not believed is not told
+    assert bool(found.doubted) == (not believed and left_by_rare < left_by_common), "but kept, where it leaves less"
     on_the_spring = [SimpleNamespace(target="spring")]  # what was found there leaves what the rare one would follow
     assert with_rare_ones(magnitudes, EFFECTS, step, on_the_spring) is step
-    model.records[0].below = 240.0  # in a band alone anything leaves noise
+    model.records[0] = SimpleNamespace(**vars(RECORD) | {"below": 240.0})  # in a band alone anything leaves noise
     assert with_rare_ones(magnitudes, EFFECTS, step) is step
 
 
-CLOSE = [(1.66, 1.01, False), (1.66, 1.1, True), (2.1, 1.01, False), (1.02, 0.99, True)]
+CLOSE = [(1.66, 1.01, False), (1.66, 1.1, False), (1.66, 1.3, True), (2.1, 1.6, False), (1.02, 0.99, True)]
 
 
 @pytest.mark.parametrize(("common", "rare", "near"), CLOSE)
-def test_a_common_effect_comes_near_a_rare_one_unless_it_leaves_twenty_times_as_much(monkeypatch, common, rare, near):
+def test_a_common_effect_comes_near_a_rare_one_unless_it_leaves_four_times_as_much(monkeypatch, common, rare, near):
     """In units of the noise: of a damper with a valve a usual one leaves 1.66, and its own form 1.01."""
     for module in (selection_step, rare_effects):
         monkeypatch.setattr(module, "analyse", left)
-    steps = [SelectionStep(None, [fitted("an effect", cost=1e3 * leaves)]) for leaves in (common, rare)]
+    model = SimpleNamespace(records=[RECORD])
+    steps = [SelectionStep(model, [fitted("an effect", cost=1e3 * leaves)]) for leaves in (common, rare)]
     assert rare_effects._comes_near(*steps) == near
 
 

@@ -120,6 +120,7 @@ def test_what_was_followed_one_by_one_or_explains_too_little_is_not_followed_in_
     monkeypatch.setattr(pair_search, "on_trial", lambda m, mod, first: tried.append(first.addition.key) or (m, mod))
     monkeypatch.setattr(pair_search, "cost_of_noise", lambda records: 0.0)
     monkeypatch.setattr(pair_search, "fit_candidates", lambda *given, least: [])
+    monkeypatch.setattr(pair_search, "is_rare", lambda addition: False)
     little = {("stop", "a"): True}
     monkeypatch.setattr(pair_search, "as_fitted", lambda mod, one: one.addition.key)
     monkeypatch.setattr(pair_search, "band_of", lambda *given: None)
@@ -159,7 +160,7 @@ def test_a_further_step_goes_on_only_where_a_candidate_explains_more_than_too_li
 @pytest.mark.parametrize(("white", "asked"), [(False, [{"friction", "gas"}]), (True, [])])
 def test_where_one_by_one_leaves_more_than_noise_pairs_are_tried_rare_effects_among_them(monkeypatch, white, asked):
     tried, effects = [], {"friction": 1, "gas": 2}
-    first = SimpleNamespace(leaves_noise=True, candidates=[], best=candidate(500.0), before=model(), as_recorded=[])
+    first = selection_step.SelectionStep(model(white=True), [candidate(500.0)])
     monkeypatch.setattr(forward_selection, "common_effects", lambda structure, every: {"friction": 1})
     monkeypatch.setattr(forward_selection, "out_of_time", lambda: False)
     monkeypatch.setattr(forward_selection, "_one_by_one", lambda *given: ([first], model(white=white)))
@@ -171,13 +172,14 @@ def test_where_one_by_one_leaves_more_than_noise_pairs_are_tried_rare_effects_am
 def test_pairs_are_of_the_candidates_for_the_model_as_given_though_a_first_effect_went_again(monkeypatch):
     """The path then begins with what was fitted beside that one, whose fits are of a larger model."""
     tried = []
-    first, second = (SimpleNamespace(leaves_noise=True, before=model(), as_recorded=[k]) for k in ("given", "later"))
+    first, second = (selection_step.SelectionStep(model(white=True), [], [k]) for k in ("given", "later"))
+    first = first._replace(doubted=["rare"])
     monkeypatch.setattr(forward_selection, "common_effects", lambda structure, every: {})
     monkeypatch.setattr(forward_selection, "out_of_time", lambda: False)
     monkeypatch.setattr(forward_selection, "_one_by_one", lambda *given: ([second], model()))
     monkeypatch.setattr(forward_selection, "two_at_once", lambda m, e, given, *others: tried.append(others[0]))
     forward_selection.forward_selection(MAGNITUDES, {}, model(), first)
-    assert tried == [["given"]]
+    assert tried == [["rare", "given"]]
 
 
 def test_a_search_out_of_time_has_looked_at_all_candidates_once(monkeypatch):

@@ -3,10 +3,14 @@
 import pytest
 import yaml
 
+from crash_estimator.benchmarks.effects_judge import drawn as drawn_case
+from crash_estimator.benchmarks.effects_plan import case_of as first_case
+from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.output_error.gauss_newton import fit
 from crash_estimator.core.diagnosis.output_error.problem import make_problem
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
+from crash_estimator.core.diagnosis.selection import candidate_fits
 from crash_estimator.core.diagnosis.selection.fitted_model import fit_given, fit_model
 from crash_estimator.model_file import ModelFile
 from crash_replay.second_generator.cases import case_of, drawn
@@ -45,3 +49,17 @@ def test_a_candidate_starts_from_the_mount_that_was_found_without_it(given):
     other = from_there.layout.start.copy()
     other[mount] *= 2.0
     assert from_there.starting_at(other).layout.trusted == (mount,)
+
+
+@pytest.mark.parametrize(("tried", "told"), [(True, ["yielding"]), (False, [])])
+def test_what_the_measured_motion_promises_is_fitted_without_stiffnesses_as_they_were_found_without_it(
+    monkeypatch, tried, told
+):
+    """A mount that yields between a cab and an engine: without that the springs of both come out far from what they
+    are, and from there no fit found it."""
+    if not tried:
+        monkeypatch.setattr(candidate_fits._Search, "as_promised", lambda self, by_motion: None)
+    _, structure, recordings = drawn_case(first_case("frontal/yielding/1/1g/10000Hz/0.75,1.1/17000960"))
+    found = diagnose(structure, recordings)
+    named = found.steps if found.verdict == "effect_missing" else ()
+    assert [step.effect for step in named] == told, found.text

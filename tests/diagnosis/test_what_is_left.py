@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from crash_estimator.core.diagnosis.observation.whitening import weights
 from crash_estimator.core.diagnosis.report.left import Left, vibration_of
 from crash_estimator.core.diagnosis.report.time_zero_step import time_zero_step
-from crash_estimator.core.diagnosis.residuals.in_band import _kept
+from crash_estimator.core.diagnosis.residuals.in_band import _kept, band_of
 from crash_estimator.core.noise_spectrum import NoiseSpectrum
 from crash_replay.conditioning import cfc_filter
 
@@ -36,6 +36,17 @@ def test_what_passes_a_filter_is_the_share_of_the_power_of_the_output_that_loses
     assert expected[1] < 0.85 < expected[0]
     assert _kept(both, PERIOD, 60) == pytest.approx(expected[1])
     assert _kept(1e3 * both, PERIOD, 60) == pytest.approx(expected[1])
+
+
+@pytest.mark.parametrize(("above", "cfc"), [(0.015, 60), (0.03, 180)])
+def test_the_band_holds_all_but_a_fiftieth_of_the_power_that_a_model_predicts(above, cfc):
+    """A damped swing of 24 Hz that sets in at once has 1.2 % of its power above CFC 60; a panel rings there."""
+    time = np.arange(4000) * 1e-4
+    swing = np.sqrt(1.0 - above) * np.sin(2.0 * np.pi * 20.0 * time) + np.sqrt(above) * np.sin(
+        2.0 * np.pi * 250.0 * time
+    )
+    residuals = SimpleNamespace(predicted=[swing[:, None]])
+    assert band_of([SimpleNamespace(period=1e-4)], residuals) == cfc
 
 
 def test_the_vibration_is_what_lies_above_the_band_that_was_compared():

@@ -45,7 +45,8 @@ def forward_selection(
     next_to_nothing = share_removed(given.residuals, final.residuals) > THRESHOLDS.all_but_folds
     if final.white or next_to_nothing or out_of_time():
         return path, final
-    pair = two_at_once(magnitudes, effects, given, step.as_recorded, alike, _followed(path, present))
+    firsts = [*step.doubted, *step.as_recorded]
+    pair = two_at_once(magnitudes, effects, given, firsts, alike, _followed(path, present))
     if pair is None:
         return path, final
     other = _one_by_one(pair.magnitudes, effects, pair.model, pair.path, present)

@@ -11,6 +11,7 @@ from ..residuals.residuals import analyse
 from .acceptance import cost_of_noise, explains_too_little, share_removed
 from .candidate_fits import CandidateFit, fit_candidates
 from .fitted_model import Model, fit_model
+from .rare_effects import common_effects, is_rare
 from .selection_step import SelectionStep, added, as_fitted, on_trial
 from .thresholds import THRESHOLDS
 
@@ -114,7 +115,8 @@ def _one_after_the_other(magnitudes: Magnitudes, effects, model: Model, candidat
         if first.addition.key == followed or analyse(first.fit).mean_square >= THRESHOLDS.real_structure:
             continue
         wider, larger = on_trial(magnitudes, model, first)
-        seconds = fit_candidates(wider, effects, larger, least=cost_of_noise(model.records))
+        beside = common_effects(model.fit.layout.structure, effects) if is_rare(first.addition) else effects
+        seconds = fit_candidates(wider, beside, larger, least=cost_of_noise(model.records))
         best = next(iter(_likely(seconds)), None)
         if best is None:
             continue

@@ -10,7 +10,7 @@ from ...effects.effect import Addition, Effect
 from ...structure import Structure
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
-from .acceptance import share_removed
+from .acceptance import cost_of_noise, share_removed
 from .candidate_fits import CandidateFit, fit_candidates
 from .selection_step import SelectionStep
 from .thresholds import THRESHOLDS
@@ -61,7 +61,7 @@ def with_rare_ones(
     if leaves_less and not (step.leaves_noise or alone.leaves_noise):
         alone = fitted(thorough=True)
     if not (alone.leaves_noise or (_leaves_next_to_nothing(alone) and not _comes_near(step, alone))):
-        return step
+        return step._replace(doubted=alone.candidates[:1]) if leaves_less and not step.leaves_noise else step
     best: dict[tuple[str, str], CandidateFit] = {}
     for one in sorted([*step.candidates, *alone.candidates], key=_rank):
         best.setdefault(one.addition.key, one)
@@ -83,13 +83,14 @@ def _leaves_next_to_nothing(step: SelectionStep) -> bool:
 
 
 def _comes_near(step: SelectionStep, rare: SelectionStep) -> bool:
-    """A common one leaves less than the noise again as well; not where that is a share of the noise that counts, and
-    twenty times what the rare one leaves."""
+    """A common one leaves less than the noise again as well; not where that is a share of the noise that counts, of
+    which the rare one explains as much as is asked of what is named."""
     if not _near_the_floor(step):
         return False
-    left, by_rare = (analyse(one.best.fit) for one in (step, rare))
-    next_to_none = left.mean_square < 1.0 + THRESHOLDS.least_share
-    return next_to_none or share_removed(left, by_rare) < THRESHOLDS.all_but_folds
+    next_to_none = analyse(step.best.fit).mean_square < 1.0 + THRESHOLDS.least_share
+    noise = cost_of_noise(step.before.records)
+    left, by_rare = (one.best.fit.cost - noise for one in (step, rare))
+    return next_to_none or left - by_rare < THRESHOLDS.named_share * left
 
 
 def _near_the_floor(step: SelectionStep) -> bool:
