@@ -133,7 +133,7 @@ def _ranked(one: CandidateFit, before: Model, shown: list[CandidateFit]) -> Rank
 
 def _confounded(one: CandidateFit, other: CandidateFit) -> bool:
     """Whether the recordings hardly tell two fitted candidates apart: with or without what is held against a mass."""
-    margin = max(THRESHOLDS.confounded, THRESHOLDS.form_errs * one.gain)
+    margin = max(THRESHOLDS.confounded, THRESHOLDS.form_errs * max(one.gain, other.gain))
     gains = [(f.gain, f.gain + f.addition.effect.log_prior_odds_against(f.fit.layout.structure)) for f in (one, other)]
     return any(abs(a - b) < margin for a, b in zip(*gains, strict=True))
 

@@ -117,7 +117,7 @@ class _Search:
         """Fit the one that the measured motion promises most of without the trust in constant stiffnesses as they were
         found without it, where it has gained less than half, and less than promised nor has any other: those may be far
         from what they are, as what is missing has bent them."""
-        if by_motion and self.model.fit.layout.stated:
+        if by_motion and self.model.fit.layout.stated and not out_of_time():
             one = by_motion[0]
             falls_short = self.found[one.addition.key].gain < THRESHOLDS.leading_share * one.gain
             if falls_short and one.gain > self.ranking()[0].gain:
