@@ -8,10 +8,13 @@ import time
 from contextlib import nullcontext
 from pathlib import Path
 
+from crash_msgs.msg import ParametersBlock
 from helpers_paths import ROOT
 from helpers_replay import environment
+from mcap.writer import Writer
+from rclpy.serialization import serialize_message
 
-from crash_estimator.benchmarks.speed_lockstep import burning
+from crash_estimator.benchmarks.speed_lockstep import burning, said
 from crash_replay.lockstep import Answered, Lockstep
 from crash_replay.same_messages import messages_by_topic
 
@@ -128,6 +131,33 @@ def test_runs_with_load_and_without_record_the_same_messages(tmp_path):
     assert [
         len(first[f"/{name}"]) for name in ("samples", "mrls/block/parameters", "constrained_kalman/block/parameters")
     ] == [121] * 3
+
+
+def test_what_is_said_of_samples_is_compared_whatever_blocks_they_come_in(tmp_path):
+    """An estimator in the place of a killed one says what it has caught up with in one block."""
+    singly = recording_of(tmp_path / "singly.mcap", [(0, [1.0]), (1, [2.0])])
+    again = recording_of(tmp_path / "again.mcap", [(0, [1.0]), (0, [1.0, 2.0])])
+    otherwise = recording_of(tmp_path / "otherwise.mcap", [(0, [1.0]), (0, [1.5, 2.0])])
+    fewer = recording_of(tmp_path / "fewer.mcap", [(0, [1.0])])
+    assert said(again) == said(singly)
+    assert said(otherwise) != said(singly)
+    assert said(fewer) != said(singly)
+
+
+def recording_of(file: Path, blocks: list[tuple[int, list[float]]]) -> Path:
+    """Of one parameter: blocks that begin with a sample of this number."""
+    with file.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema("crash_msgs/msg/ParametersBlock", "ros2msg", b"")
+        channel = writer.register_channel("/mrls/block/parameters", "cdr", schema)
+        for number, values in blocks:
+            times = [(number + k) * 1_000_000 for k in range(len(values))]
+            block = ParametersBlock(number=number, time_ns=times, name=["front.stiffness"], value=values)
+            block.std, block.status = [1.0] * len(values), [0] * len(values)
+            writer.add_message(channel, log_time=0, publish_time=0, data=serialize_message(block))
+        writer.finish()
+    return file
 
 
 def run_recorded_to(file: Path) -> str:

@@ -205,9 +205,11 @@ class Live:
             yield Row(f"jitter of samples at 1 kHz {what}, p99", *said, p99 / 0.2, reach, least=False)
 
     def lockstep(self) -> Iterator[Row]:
-        """The last of the runs loses an estimator on the way: of it only what the estimators say is compared.
+        """The last of the runs loses an estimator on the way: of it only what the estimators say of each sample is
+        compared.
 
-        One that comes back tells where from its estimates hold, which is an event more.
+        One that comes back tells where from its estimates hold, which is an event more, and says what it has caught up
+        with once more, in one block.
         """
         bag, files = self.bag(4, 0.12, 1000.0), []
         with burning():
@@ -218,6 +220,6 @@ class Live:
         whole, first = [messages_by_topic(file) for file in files[:-1]], messages_by_topic(files[0])
         same = sum(messages == first for messages in whole) + (said(files[-1]) == said(files[0]))
         each = sum(map(len, said(files[0]).values()))
-        count = f"{same} of {len(files)} recordings the same, {each} messages of estimates each"
+        count = f"{same} of {len(files)} recordings the same, {each} rows of estimates each"
         what = "lock-step on busy cores, in the last run an estimator is killed and started again"
-        yield Row(what, count, "the first's messages, to the last byte", same / len(files), 1.0)
+        yield Row(what, count, "the first's messages (the last's rows), to the last byte", same / len(files), 1.0)

@@ -8,13 +8,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from crash_msgs.msg import ParametersBlock, ResidualsBlock
 from crash_msgs.srv import Burst
+from mcap.reader import make_reader
+from rclpy.serialization import deserialize_message
 from std_srvs.srv import Trigger
 
-from crash_replay.same_messages import messages_by_topic
-
+from ..nodes.estimate_messages import samples_of
 from .speed_graph import Graph
 
+BLOCKS = {f"crash_msgs/msg/{kind.__name__}": kind for kind in (ParametersBlock, ResidualsBlock)}
 BURNER = "while True: sum(range(10**6))"
 BEFORE, SETTLED = 60, 2.0
 """Samples before an estimator is killed; s after which the one in its place is heard by all."""
@@ -84,7 +88,20 @@ def _call(graph: Graph, kind: type, service: str, request) -> None:
     graph.listener.destroy_client(client)
 
 
-def said(file: Path) -> dict[str, list[tuple[int, bytes]]]:
-    """Stamps and bytes of the messages with parameters and residuals, by topic."""
-    found = messages_by_topic(file)
-    return {topic: messages for topic, messages in found.items() if "/block/" in topic}
+def said(file: Path) -> dict[str, dict[int, set[bytes]]]:
+    """By topic of the blocks and number of the sample: what was said of it, to the last bit.
+
+    An estimator that comes back says all that it has caught up with in one block: it is the samples that are compared,
+    whatever they came in. One that was told twice otherwise has two entries.
+    """
+    found: dict[str, dict[int, set[bytes]]] = {}
+    with file.open("rb") as stream:
+        for schema, channel, message in make_reader(stream).iter_messages(log_time_order=False):
+            if schema is None or schema.name not in BLOCKS:
+                continue
+            samples = found.setdefault(channel.topic, {})
+            block = deserialize_message(message.data, BLOCKS[schema.name])
+            head = repr((block.run, block.revision, block.model, block.method, block.name, block.unit)).encode()
+            for number, row in samples_of(block):
+                samples.setdefault(number, set()).add(head + b"".join(np.asarray(v).tobytes() for v in row.values()))
+    return found

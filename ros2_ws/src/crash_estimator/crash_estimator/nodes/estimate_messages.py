@@ -108,7 +108,7 @@ def estimates_from(
     Of the covariances only the diagonals travel: all else in them is NaN.
     """
     by_kind = [
-        {number: row for m in messages for number, row in _samples(m)} for messages in (parameters, residuals, forces)
+        {number: row for m in messages for number, row in samples_of(m)} for messages in (parameters, residuals, forces)
     ]
     numbers = sorted(set.intersection(*(set(rows) for rows in by_kind)))
     if not numbers:
@@ -128,7 +128,7 @@ NAMES = {"parameters": "name", "equations": "name", "elements": "element", "bodi
 """Where a block has the names of what a row has values of."""
 
 
-def _samples(message: ParametersBlock | ResidualsBlock | Forces) -> Iterator[tuple[int, dict]]:
+def samples_of(message: ParametersBlock | ResidualsBlock | Forces) -> Iterator[tuple[int, dict]]:
     """(number, fields) of each sample of a block."""
     n = len(message.time_ns)
     tables = {field: np.asarray(getattr(message, field)).reshape(n, -1) for field in FIELDS[type(message)]}
