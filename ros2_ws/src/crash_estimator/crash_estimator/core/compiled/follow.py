@@ -8,6 +8,7 @@ from .kalman import kalman_step
 from .motion import APART, UNLOADING, move, regress, touch
 from .regressor_errors import known_of, move_on, sensors_of
 from .rls import rls_step
+from .short_loops import short_loops
 from .views import method_of, plan_views, row_views, scratch_views, size_of, state_views
 
 ESTIMATED, KNOWN, UNLOADS, SEPARATE, CLAMPED, _ = (float(status) for status in ParameterStatus)
@@ -19,6 +20,7 @@ def follow(whole, others, state, times_ns, values, rows):
 
     `state`, which begins with the row before them, is changed in place.
     """
+    short_loops()
     n, method = size_of(whole), method_of(others)
     plan = plan_views(whole[len(n) :], others[len(method) :], n)
     s = state_views(state[rows.shape[1] :], n)
@@ -61,6 +63,7 @@ def follow(whole, others, state, times_ns, values, rows):
 @njit(cache=True)
 def step(whole, others, before, after, time_ns, values, row):
     """`follow` for one sample of (c,) values: fills the state after it, which begins with its row of that length."""
+    short_loops()
     after[:] = before
     times = np.empty(1, dtype=np.int64)
     times[0] = time_ns

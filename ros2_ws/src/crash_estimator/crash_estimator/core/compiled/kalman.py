@@ -22,6 +22,7 @@ from ..regression import QUIETEST
 from ..regressor_errors import SMALLEST_SHARE
 from .factors import add_square, observe, product_of, seen_through, widen
 from .regressor_errors import pass_one
+from .short_loops import short_loops
 
 
 @njit(cache=True)
@@ -32,6 +33,7 @@ def kalman_update(theta, factors, noise, gradient, target, active, lower, upper,
     where estimated; lower, upper: bounds of the first of them; clamped (p,) is set to 1.0 where one is held at its
     bound; gain (p, q) is filled with that of each equation in its turn.
     """
+    short_loops()
     p = len(theta)
     room = np.empty((p + 4, p))  # one piece of memory is found sooner than five
     start, free, psi, spread, prior = room[0], room[1], room[2], room[3], room[4:]

@@ -3,6 +3,8 @@
 import numpy as np
 from numba import njit
 
+from .short_loops import short_loops
+
 
 @njit(cache=True, error_model="numpy")
 def invert(matrix, keep, scale):
@@ -11,6 +13,7 @@ def invert(matrix, keep, scale):
 
     Its diagonal is scaled to 1 (N/m beside N s/m); then Gauss-Jordan, which needs no pivoting for such a matrix.
     """
+    short_loops()
     n = len(matrix)
     for j in range(n):
         scale[j] = 1.0 / np.sqrt(matrix[j, j]) if keep[j] else 0.0

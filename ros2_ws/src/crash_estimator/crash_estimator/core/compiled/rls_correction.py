@@ -7,6 +7,7 @@ from numba import njit
 
 from .linear import invert, multiply
 from .regressor_errors import pass_on
+from .short_loops import short_loops
 
 
 class Recursion(NamedTuple):
@@ -38,6 +39,7 @@ def correct(
     The influence of the sample itself is left to the caller. walks: a filter beside it (`lag.py`) counts what errors of
     the motion do.
     """
+    short_loops()
     p, q = len(r.theta), len(target)
     of_q, of_p = np.empty((q + p + 2, q)), np.empty((q + 3 * p + 3, p))  # two are found sooner than eleven
     weight, valid, residual, before = of_q[:q], of_q[q], of_q[q + 1], of_q[q + 2 :]

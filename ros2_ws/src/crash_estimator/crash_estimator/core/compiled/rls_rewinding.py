@@ -4,11 +4,13 @@ import numpy as np
 from numba import njit
 
 from .rls_correction import add_influence, correct, covariance_of, recursion_of
+from .short_loops import short_loops
 
 
 @njit(cache=True)
 def chosen_variance(s, out):
     """m E[(mean v)^2 | mean error] of a window that is used again, for each equation."""
+    short_loops()
     m, q, p = s.window_gradient.shape
     covariance_of(s.carried, s.window_influence, s.window_variance, s.covariance)
     for i in range(q):
@@ -46,6 +48,7 @@ def rewind(limits, method, walks, s, by_errors, errors, clamped, excess):
 
     excess: of that mean over its limit, as it is.
     """
+    short_loops()
     m, q = s.window_error.shape
     repeated, error, held = np.empty((m, q)), np.empty(q), clamped.copy()
     gain, chosen = np.empty((len(s.theta), q)), np.empty(q)
