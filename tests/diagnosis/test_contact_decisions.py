@@ -49,7 +49,7 @@ def with_contacts(monkeypatch, promised, noise_under="none", ends_early=False) -
     for name, short in (("never_pulling", "a"), ("elastic_when_spent", "b"), ("all_when_spent", "c")):
         monkeypatch.setattr(assumptions, name, lambda structure, short=short: short)
     monkeypatch.setattr(assumptions, "_promised", lambda other, *given: promised.get(other, -np.inf))
-    monkeypatch.setattr(assumptions, "out_of_time", lambda: False)
+    monkeypatch.setattr(assumptions, "search_is_over", lambda: False)
     monkeypatch.setattr(assumptions, "_as_exact_as_needed", search)
     return searched
 

@@ -57,7 +57,7 @@ def test_care_is_taken_within_reach_of_noise_and_with_a_further_effect_or_a_prof
     monkeypatch.setattr(candidate_fits, "_Search", Search)
     monkeypatch.setattr(candidate_fits, "candidates", lambda *given: ())
     monkeypatch.setattr(candidate_fits, "screen", lambda *given: [])
-    monkeypatch.setattr(candidate_fits, "out_of_time", lambda: False)
+    monkeypatch.setattr(candidate_fits, "search_is_over", lambda: False)
     before = model(mean_square=left)
     assert candidate_fits.fit_candidates(None, {}, before, thorough=True, earlier=earlier) == tried
 
@@ -81,23 +81,23 @@ def test_rivals_that_a_screening_does_not_see_are_fitted_beside_what_leaves_nois
     monkeypatch.setattr(candidate_fits, "_Search", Search)
     monkeypatch.setattr(candidate_fits, "candidates", lambda *given: ())
     monkeypatch.setattr(candidate_fits, "screen", lambda *given: [])
-    monkeypatch.setattr(candidate_fits, "out_of_time", lambda: False)
+    monkeypatch.setattr(candidate_fits, "search_is_over", lambda: False)
     candidate_fits.fit_candidates(None, {}, model(white=white), thorough=True)
     assert called == asked
 
 
-@pytest.mark.parametrize(("leaves_noise", "explained", "out_of_time", "looked_for"), [
+@pytest.mark.parametrize(("leaves_noise", "explained", "over", "looked_for"), [
     (False, 0.9, False, True), (True, 0.9, False, False), (False, 0.96, False, False), (False, 0.9, True, False),
 ])  # fmt: skip
 def test_an_effect_on_two_elements_is_looked_for_only_where_one_does_not_explain_nearly_all_and_there_is_time(
-    monkeypatch, leaves_noise, explained, out_of_time, looked_for
+    monkeypatch, leaves_noise, explained, over, looked_for
 ):
     asked, given = [], model(white=True)
     first = SimpleNamespace(leaves_noise=leaves_noise, candidates=[], best=candidate(500.0), before=given)
     monkeypatch.setattr(forward_selection, "analyse", lambda fit: None)
     monkeypatch.setattr(forward_selection, "share_removed", lambda before, after: explained)
     monkeypatch.setattr(forward_selection, "common_effects", lambda *given: {})
-    monkeypatch.setattr(forward_selection, "out_of_time", lambda: out_of_time)
+    monkeypatch.setattr(forward_selection, "search_is_over", lambda: over)
     monkeypatch.setattr(forward_selection, "two_of_one_effect", lambda *given: asked.append(given) or [])
     monkeypatch.setattr(forward_selection, "near_the_floor", lambda *given: None)
     monkeypatch.setattr(forward_selection, "_one_by_one", lambda *given: ([first], model(white=True)))
@@ -162,7 +162,7 @@ def test_where_one_by_one_leaves_more_than_noise_pairs_are_tried_rare_effects_am
     tried, effects = [], {"friction": 1, "gas": 2}
     first = selection_step.SelectionStep(model(white=True), [candidate(500.0)])
     monkeypatch.setattr(forward_selection, "common_effects", lambda structure, every: {"friction": 1})
-    monkeypatch.setattr(forward_selection, "out_of_time", lambda: False)
+    monkeypatch.setattr(forward_selection, "search_is_over", lambda: False)
     monkeypatch.setattr(forward_selection, "_one_by_one", lambda *given: ([first], model(white=white)))
     monkeypatch.setattr(forward_selection, "two_at_once", lambda m, effects, *given: tried.append(set(effects)))
     path, _ = forward_selection.forward_selection(MAGNITUDES, effects, model(), first)
@@ -175,16 +175,16 @@ def test_pairs_are_of_the_candidates_for_the_model_as_given_though_a_first_effec
     first, second = (selection_step.SelectionStep(model(white=True), [], [k]) for k in ("given", "later"))
     first = first._replace(doubted=["rare"])
     monkeypatch.setattr(forward_selection, "common_effects", lambda structure, every: {})
-    monkeypatch.setattr(forward_selection, "out_of_time", lambda: False)
+    monkeypatch.setattr(forward_selection, "search_is_over", lambda: False)
     monkeypatch.setattr(forward_selection, "_one_by_one", lambda *given: ([second], model()))
     monkeypatch.setattr(forward_selection, "two_at_once", lambda m, e, given, *others: tried.append(others[0]))
     forward_selection.forward_selection(MAGNITUDES, {}, model(), first)
     assert tried == [["rare", "given"]]
 
 
-def test_a_search_out_of_time_has_looked_at_all_candidates_once(monkeypatch):
+def test_a_search_that_is_over_has_looked_at_all_candidates_once(monkeypatch):
     step = SimpleNamespace(best=None, before=None, candidates=[])
-    monkeypatch.setattr(forward_selection, "out_of_time", lambda: True)
+    monkeypatch.setattr(forward_selection, "search_is_over", lambda: True)
     monkeypatch.setattr(forward_selection, "common_effects", lambda *given: {})
     monkeypatch.setattr(forward_selection, "_next_step", lambda *given: step)
     monkeypatch.setattr(forward_selection, "with_rare_ones", lambda m, e, first, found: first)

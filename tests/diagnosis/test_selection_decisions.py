@@ -29,16 +29,16 @@ def test_how_many_additions_are_believed_together(left, believed):
     assert len(found.steps) == min(believed + 1, len(models) - 1)
 
 
-@pytest.mark.parametrize(("left", "out_of_time"), [(1.0, False), (1.5, True)])
-def test_what_leaves_noise_or_has_no_time_is_not_searched_in_a_smaller_band(monkeypatch, left, out_of_time):
+@pytest.mark.parametrize(("left", "over"), [(1.0, False), (1.5, True)])
+def test_what_leaves_noise_or_has_no_time_is_not_searched_in_a_smaller_band(monkeypatch, left, over):
     path = assumptions.SelectionPath(None, [], model(left), 0, None, (), 36)
     monkeypatch.setattr(assumptions, "_selected", lambda *given: path)
-    monkeypatch.setattr(assumptions, "out_of_time", lambda: out_of_time)
+    monkeypatch.setattr(assumptions, "search_is_over", lambda: over)
     assert assumptions.select(None, (), {}) is path  # the band would be asked of its fit, which is none
 
 
-@pytest.mark.parametrize(("wanted", "out_of_time", "searches"), [(True, False, 2), (False, False, 1), (True, True, 1)])
-def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypatch, wanted, out_of_time, searches):
+@pytest.mark.parametrize(("wanted", "over", "searches"), [(True, False, 2), (False, False, 1), (True, True, 1)])
+def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypatch, wanted, over, searches):
     begun, cells, given = [], [], model(1.5)
     made_up = {
         "first_step": lambda *given: None,
@@ -50,7 +50,7 @@ def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypa
         "analyse": lambda fit: None,
         "_wants_finer_curves": lambda *given: wanted,
         "up_to_the_least_error": lambda steps, final, present: (steps, final),
-        "out_of_time": lambda: out_of_time,
+        "search_is_over": lambda: over,
     }
     for name, instead in made_up.items():
         monkeypatch.setattr(assumptions, name, instead)

@@ -17,6 +17,7 @@ from crash_estimator.core.diagnosis.report.tolerance import DEFAULT, Tolerance, 
 from crash_estimator.core.diagnosis.report.verdict import Evidence, verdict_on
 from crash_estimator.core.diagnosis.residuals.in_band import InBand
 from crash_estimator.core.diagnosis.residuals.score_test import Drift
+from crash_estimator.core.diagnosis.selection import search_limit
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.structure import Coefficient, ModelError
 from crash_estimator.model_file import load_model
@@ -234,6 +235,18 @@ def test_a_time_limit_gives_the_best_answer_so_far(frontal):
     assert "stopped after 0.001 s" in hurried.text and "stopped" not in frontal.text
     assert hurried.verdict == "unexplained" and hurried.as_json()["stopped"] is True
     assert len(hurried.ranking) >= 3 and not any(one.fitted for one in hurried.ranking)  # screened, and said to be so
+
+
+def test_a_search_ends_after_a_number_of_iterations_unless_a_time_is_stated(monkeypatch):
+    structure, recordings = load_model("frontal_single"), [read_bag(FRONTAL)]
+    monkeypatch.setattr(search_limit, "LONGEST_SEARCH", 120)
+    for _ in range(2):  # those of the search before do not count
+        hurried = diagnose(structure, recordings)
+        assert hurried.stopped and "stopped after 120 iterations" in hurried.text
+        fitted = [one.fitted for one in hurried.ranking]
+        assert any(fitted) and not all(fitted)
+    whole = diagnose(structure, recordings, seconds=float("inf"))
+    assert not whole.stopped and "stopped" not in whole.text
 
 
 def test_a_time_limit_is_above_zero(monkeypatch, capsys):

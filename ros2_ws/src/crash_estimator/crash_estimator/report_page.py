@@ -51,7 +51,7 @@ def write_report(  # noqa: PLR0913 - every option of the command
     settings: Mapping[str, float] = {},
     effects: Mapping[str, Effect] = EFFECTS,
     markdown: bool = False,
-    seconds: float = np.inf,
+    seconds: float | None = None,
     told: Callable[[str], None] = lambda line: None,
 ) -> Path:
     """Write `report.html` into the folder, with `markdown` also `report.md` and its figures -> the page.
@@ -132,7 +132,7 @@ def _test(recording: Recording, structure: Structure, end: float) -> list[Block]
 
 
 def _missing(
-    recording: Recording, structure: Structure, end: float, effects: Mapping[str, Effect], seconds: float
+    recording: Recording, structure: Structure, end: float, effects: Mapping[str, Effect], seconds: float | None
 ) -> tuple[str, list[Block], Structure | None]:
     """The page's first sentence, what `diagnose` says, the model with what it has found; None where that is nothing.
 

@@ -12,11 +12,11 @@ def add_model_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model", required=True, help=MODEL)
 
 
-def add_time_limit(parser: argparse.ArgumentParser, default: float = math.inf) -> None:
+def add_time_limit(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--time-limit", metavar="S", type=_seconds, default=default,
-        help="after so many seconds the diagnosis tries nothing more, and the best answer so far is given"
-        + (f"; default {default:g}" if math.isfinite(default) else ""),
+        "--time-limit", metavar="S", type=_seconds,
+        help="after so many seconds the diagnosis tries nothing more, and the best answer so far is given; inf: all is "
+        "tried; default: a number of iterations instead, which takes some 10 s for two recordings of a dummy",
     )  # fmt: skip
 
 

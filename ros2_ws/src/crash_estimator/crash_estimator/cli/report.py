@@ -10,8 +10,6 @@ from crash_replay.said import Parser
 from ..core.methods import METHODS
 from .options import RECORDING, add_effects_option, add_model_option, add_time_limit
 
-DIAGNOSED_FOR = 8.0
-"""s: a page is for looking at what there is; who wants the whole search has `diagnose`."""
 SHOWN = ["rls", "mrls", "constrained_kalman"]
 
 
@@ -40,7 +38,7 @@ def _parser() -> Parser:
     parser.add_argument(
         "--cfc", type=int, choices=(0, *CFC_CLASSES), default=None, help="filter of the free run's signals; 0: none"
     )
-    add_time_limit(parser, DIAGNOSED_FOR)
+    add_time_limit(parser)
     add_effects_option(parser)
     return parser
 

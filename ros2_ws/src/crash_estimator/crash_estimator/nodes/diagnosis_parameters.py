@@ -1,6 +1,5 @@
 """The parameters of `diagnosis`, with what they mean and may be."""
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -24,7 +23,11 @@ PARAMETERS = {
         live=True,
     ),
     "time_limit": Allowed(
-        0.0, "s after which the final answer is the best so far; 0: everything is tried", 0.0, 1e5, live=True
+        0.0,
+        "s after which the final answer is the best so far; 0: after a number of iterations, some 10 s for two dummies",
+        0.0,
+        1e5,
+        live=True,
     ),
     "add_first": Allowed(False, "add the first effect that a final answer names, once; none where it is unexplained"),
     "estimators": Allowed([""], "names of estimators that it is added to as well", pattern=NAME),
@@ -37,7 +40,7 @@ class Wanted(NamedTuple):
 
     every_ns: int  # of the crash, between two rankings
     tolerance: "Tolerance | None"  # None: as it is where nobody asks for any
-    seconds: float  # for the final answer
+    seconds: float | None  # for the final answer; None: a number of iterations
 
     @classmethod
     def from_values(cls, values: Mapping[str, Any]) -> "Wanted":
@@ -48,4 +51,4 @@ class Wanted(NamedTuple):
             from ..core.diagnosis import tolerance_of  # late: it takes long to import, and most ask for nothing
 
             tolerance = tolerance_of(text)
-        return cls(round(values["every"] * 1e9), tolerance, values["time_limit"] or math.inf)
+        return cls(round(values["every"] * 1e9), tolerance, values["time_limit"] or None)

@@ -3,7 +3,6 @@
 `diagnosis_answerer` is that process: what it computes with is not imported on this side.
 """
 
-import math
 import signal
 import subprocess
 import sys
@@ -29,7 +28,7 @@ class Task(NamedTuple):
     recording: Recording  # as far as the samples go
     final: bool  # that was the last one: the offline answer
     tolerance: "Tolerance | None" = None  # of the final answer: what is good enough, where somebody has said it
-    seconds: float = math.inf  # of the final answer: after which nothing more is tried
+    seconds: float | None = None  # of the final answer: after which nothing more is tried; None: as of `diagnose`
 
 
 class Reply(NamedTuple):

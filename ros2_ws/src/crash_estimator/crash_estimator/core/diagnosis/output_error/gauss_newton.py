@@ -19,6 +19,7 @@ from ..observation.trajectory import Trajectory
 from ..parameterization.experiment import Experiment
 from ..parameterization.layout import Layout
 from .continuation import FREE_RUN, FROM_MEASURED_MOTION, Schedule
+from .effort import count_iteration
 from .laplace_evidence import cholesky, log_prior, posterior
 from .normal_equations import Normal, equation_error, may_diverge, normal_equations
 from .problem import OutputErrorProblem, Point
@@ -161,6 +162,7 @@ def fit(
     halvings, last, iteration, circles = 0, np.inf, 0, 0
     while True:
         iteration += 1
+        count_iteration()
         stage = stages.pop(0) if stages else FREE_RUN
         try:
             # a shape constant fitted to a motion that is still wrong goes astray

@@ -1,6 +1,5 @@
 """Which physical effect is missing: the answer, from a structure and one or more recordings of it."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -19,9 +18,9 @@ from ..selection.acceptance import needed_share, settled
 from ..selection.assumptions import SelectionPath, up_to
 from ..selection.fitted_model import Model
 from ..selection.onset_search import select_from_the_onset
+from ..selection.search_limit import limit_text, search_is_over, search_limit
 from ..selection.selection_step import band_of_steps, fit_of_all, sized_models
 from ..selection.thresholds import THRESHOLDS
-from ..selection.time_limit import out_of_time, time_limit
 from ..selection.time_zero import TimeZero
 from .fitted_constants import FittedConstant, fitted_constants
 from .left import Left, left_by
@@ -64,7 +63,7 @@ class Diagnosis:
     misfit_after: tuple[MisfitWindow, ...]
     structure: Structure  # with the effects that were added
     models: tuple[Model, ...]  # as given, then after each step
-    stopped: bool = False  # the time was up before everything was tried
+    stopped: bool = False  # before everything was tried
 
     @property
     def effects_added(self) -> tuple[StepReport, ...]:
@@ -94,11 +93,12 @@ def diagnose(
     recordings: Sequence[Recording],
     effects: Mapping[str, Effect] = EFFECTS,
     tolerance: Tolerance = DEFAULT,
-    seconds: float = math.inf,
+    seconds: float | None = None,
 ) -> Diagnosis:
     """Compare a structure (with the effects that it has) with recordings of it, and name what is missing.
 
-    tolerance: what may be left of a model that is good enough; seconds: after which nothing more is tried.
+    tolerance: what may be left of a model that is good enough; seconds: after which nothing more is tried (inf: all is
+    tried); None: after `LONGEST_SEARCH` iterations instead.
 
     Raises ModelError or RecordingError, one line, where the data or the model is at fault.
     """
@@ -106,15 +106,15 @@ def diagnose(
         raise ModelError("a diagnosis needs at least one recording")
     recordings, clipped = without_clipped(recordings)
     structure, recordings = with_accelerations(structure, recordings)
-    with time_limit(seconds):
+    with search_limit(seconds):
         begun = select_from_the_onset(structure, recordings, effects)
-        stopped = out_of_time()
+        stopped = search_is_over()
     found = _answer(structure, begun.path, tolerance, begun.zero)
     remarks = [clipped] if clipped else []
     if begun.unused:
         remarks.append(signals_begin({shift.test: shift.seconds for shift in begun.unused}))
     if stopped:
-        remarks.append(f"stopped after {seconds:g} s: not everything was tried")
+        remarks.append(f"stopped after {limit_text(seconds)}: not everything was tried")
     return replace(found, stopped=stopped, text="; ".join([found.text, *remarks]))
 
 

@@ -26,9 +26,9 @@ from .fitted_model import Model, fit_given, fit_model
 from .forward_selection import first_step, forward_selection
 from .pruning import up_to_the_least_error
 from .rare_effects import found_as_common
+from .search_limit import search_is_over
 from .selection_step import SelectionStep, as_found, sized_models
 from .thresholds import THRESHOLDS
-from .time_limit import out_of_time
 
 CELLS = 36
 """Of a free curve over its crush scale: 1 cm of a crush of 0.4 m, the length of a fold of a longitudinal."""
@@ -67,7 +67,7 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
     """The effects that a structure lacks, in the band below its vibration. Raises ModelError where it names an effect
     that there is not."""
     path = _selected(structure, records, effects)
-    if path.final.white or out_of_time():
+    if path.final.white or search_is_over():
         return path
     left = analyse(path.as_recorded)
     vibration = vibrates_from(left, records)
@@ -98,7 +98,7 @@ def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: 
     tried = [structure]
     untried: list[Callable[[Structure], Structure]] = [never_pulling, elastic_when_spent, all_when_spent]
     path = _as_exact_as_needed(structure, records, effects, elsewhere=lambda begun: bool(promised(begun)))
-    while untried and not out_of_time() and (others := promised(path)):
+    while untried and not search_is_over() and (others := promised(path)):
         best = max(others, key=others.__getitem__)
         untried.remove(best)
         otherwise = _as_exact_as_needed(best(path.structure), path.records, effects, path.added)
@@ -183,7 +183,7 @@ def _as_exact_as_needed(
         models = [step.before for step in path.steps if step.before is not given]
         models += [] if path.steps[-1].before is path.final else [path.final]
         fewer = (_in_doubt(doubted, model) for model in models if not (model is path.final and path.noise))
-        if out_of_time() or not any(map(_leaves_noise, fewer)):
+        if search_is_over() or not any(map(_leaves_noise, fewer)):
             return path
         start = _in_doubt(doubted, path.steps[0].before)  # a candidate's fit may have shown a better one
     other = _with_curves_as_fine_as_needed(doubted, start, effects, path.added if path else expected)
@@ -221,7 +221,7 @@ def _with_curves_as_fine_as_needed(
 ) -> SelectionPath:  # fmt: skip
     structure, records, present = magnitudes.structure, magnitudes.records, given.additions
     cells, first = magnitudes.cells, first_step(magnitudes, effects, given, expected)
-    if isinstance(first, SelectionStep) and not (first.leaves_noise or out_of_time()):
+    if isinstance(first, SelectionStep) and not (first.leaves_noise or search_is_over()):
         begun = SelectionPath(structure, [first], given, len(present), given.fit, records, cells, whole=False)
         if elsewhere(begun):
             return begun
@@ -229,7 +229,7 @@ def _with_curves_as_fine_as_needed(
     as_recorded = in_the_sensors_noise(sized_models(steps, final)[-1], records)
     finer = measure_magnitudes(structure, records, FINER_CELLS)
     mimicked = final.white and not drift_of(as_recorded).constant
-    if not out_of_time() and _wants_finer_curves(final, mimicked, analyse(as_recorded), finer, len(present)):
+    if not search_is_over() and _wants_finer_curves(final, mimicked, analyse(as_recorded), finer, len(present)):
         found = final.additions[len(present) :]
         finer_given = fit_given(finer, records, present)
         finer_first = first_step(finer, effects, finer_given, found)

@@ -17,8 +17,8 @@ from .acceptance import cost_of_noise
 from .candidates import candidates
 from .fitted_model import Model
 from .score_screening import Screened, screen, shortlist
+from .search_limit import search_is_over
 from .thresholds import THRESHOLDS
-from .time_limit import out_of_time
 
 
 class CandidateFit(NamedTuple):
@@ -74,7 +74,7 @@ def fit_candidates(
         ways = search.slowly, search.other_variants, search.anew, search.profile
         of_little = ways[: 3 if model.residuals.mean_square >= THRESHOLDS.real_structure else 1]
         for harder in ways:
-            if out_of_time() or search.reached_the_floor():
+            if search_is_over() or search.reached_the_floor():
                 break
             if search.explains_most():
                 if search.out_of_reach():
@@ -82,7 +82,7 @@ def fit_candidates(
             elif earlier or harder not in of_little:
                 break
             harder()
-    if thorough and not out_of_time() and search.reached_the_floor():
+    if thorough and not search_is_over() and search.reached_the_floor():
         search.hardly_screened()
         if not model.white:
             search.rival_with_care()
@@ -117,7 +117,7 @@ class _Search:
         """Fit the one that the measured motion promises most of without the trust in constant stiffnesses as they were
         found without it, where it has gained less than half, and less than promised nor has any other: those may be far
         from what they are, as what is missing has bent them."""
-        if by_motion and self.model.fit.layout.stated and not out_of_time():
+        if by_motion and self.model.fit.layout.stated and not search_is_over():
             one = by_motion[0]
             falls_short = self.found[one.addition.key].gain < THRESHOLDS.leading_share * one.gain
             if falls_short and one.gain > self.ranking()[0].gain:
@@ -201,7 +201,7 @@ class _Search:
     def _fit(
         self, addition: Addition, screened: Screened | None = None, schedule: Schedule = FROM_MEASURED_MOTION
     ) -> None:
-        if (id(addition), schedule) in self.done or out_of_time():
+        if (id(addition), schedule) in self.done or search_is_over():
             return
         self.done[id(addition), schedule] = addition
         problem = self._problem(addition)

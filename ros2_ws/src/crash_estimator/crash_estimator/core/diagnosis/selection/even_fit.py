@@ -17,7 +17,7 @@ from ..parameterization.layout import Layout
 from ..residuals.in_band import in_band
 from ..residuals.residuals import analyse, output_scale
 from .fitted_model import Model
-from .time_limit import out_of_time
+from .search_limit import search_is_over
 
 
 def evenly_fitted(model: Model, cfc: int | None, *others: Model) -> Model:
@@ -27,7 +27,7 @@ def evenly_fitted(model: Model, cfc: int | None, *others: Model) -> Model:
     Whether all that is left is noise only the sensors' own noise decides: what was found of that stays.
     """
     problem = model.fit.problem
-    if not problem.noise_is_inflated or out_of_time():
+    if not problem.noise_is_inflated or search_is_over():
         return model
     evenly = problem.on([_all_alike(record, problem.layout) for record in problem.records])
     ended = [model.fit, *(one.fit for one in others if _as_many_parameters(one.fit.layout, problem.layout))]

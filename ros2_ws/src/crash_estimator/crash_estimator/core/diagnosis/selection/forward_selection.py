@@ -12,9 +12,9 @@ from .fitted_model import Model
 from .pair_search import Pair, as_expected, near_the_floor, two_at_once, two_of_one_effect
 from .pruning import up_to_the_least_error, without_the_superseded
 from .rare_effects import common_effects, elsewhere_than, is_rare, with_rare_ones
+from .search_limit import search_is_over
 from .selection_step import SelectionStep, added, as_fitted, band_of_steps, in_recorded_noise, only_screened, weighed
 from .thresholds import THRESHOLDS
-from .time_limit import out_of_time
 
 
 def first_step(
@@ -36,14 +36,14 @@ def forward_selection(
     present = len(given.additions)
     alike: list[Pair] = []
     pair, step = (first, None) if isinstance(first, Pair) else (None, first)
-    if step and not (step.leaves_noise or _explains_nearly_all(step) or out_of_time()):
+    if step and not (step.leaves_noise or _explains_nearly_all(step) or search_is_over()):
         alike = two_of_one_effect(magnitudes, given, step.candidates)
         pair = near_the_floor(alike, step.candidates)
     if pair:
         return _one_by_one(pair.magnitudes, effects, pair.model, pair.path, present)
     path, final = _one_by_one(magnitudes, effects, given, [], present, step)
     next_to_nothing = share_removed(given.residuals, final.residuals) > THRESHOLDS.all_but_folds
-    if final.white or next_to_nothing or out_of_time():
+    if final.white or next_to_nothing or search_is_over():
         return path, final
     firsts = [*step.doubted, *step.as_recorded]
     pair = two_at_once(magnitudes, effects, given, firsts, alike, _followed(path, present))
@@ -63,7 +63,7 @@ def _one_by_one(
     """The best candidate is added as long as there is one; path: the steps that have led to the model, first: the next
     one in the sensors' noise, where it is known."""
     common, evenly = common_effects(magnitudes.structure, effects), None
-    while not (path and out_of_time()):
+    while not (path and search_is_over()):
         if first is None:
             first = _next_step(magnitudes, common, model, path, present)
             found = model.additions[present:]

@@ -20,9 +20,9 @@ from .assumptions import CELLS, SelectionPath, first_believed, select
 from .candidates import candidates
 from .fitted_model import Model, fit_model
 from .rare_effects import common_effects
+from .search_limit import search_is_over
 from .selection_step import as_found
 from .thresholds import THRESHOLDS
-from .time_limit import out_of_time
 from .time_zero import FARTHEST, Shift, TimeZero, moved_by, onsets, sharpened, time_zero_wrong
 
 
@@ -81,7 +81,7 @@ class _Search:
         asked: Callable | None = None
         of: SelectionPath | None = None
         for look in (self._at_onsets, self._sharper, self._sharper_by_other_laws, self._sharper_by_other_laws):
-            if out_of_time() or _left_by(path).mean_square >= THRESHOLDS.real_structure:
+            if search_is_over() or _left_by(path).mean_square >= THRESHOLDS.real_structure:
                 break
             there = () if asked == look and of is path else look(path, begins, shifts, most)
             asked, of = look, path

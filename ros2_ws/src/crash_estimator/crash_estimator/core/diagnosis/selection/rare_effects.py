@@ -12,9 +12,9 @@ from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
 from .acceptance import cost_of_noise, share_removed
 from .candidate_fits import CandidateFit, fit_candidates
+from .search_limit import search_is_over
 from .selection_step import SelectionStep
 from .thresholds import THRESHOLDS
-from .time_limit import out_of_time
 
 
 def common_effects(structure: Structure, effects: Mapping[str, Effect]) -> Mapping[str, Effect]:
@@ -48,7 +48,7 @@ def with_rare_ones(
     model = step.before
     in_a_band = any(np.isfinite(record.below) for record in model.records)
     little_is_missing = model.white and not (step.best and step.best.gain > THRESHOLDS.gain_beyond_white)
-    if not rare or little_is_missing or in_a_band or out_of_time():
+    if not rare or little_is_missing or in_a_band or search_is_over():
         return step
     least = min([model.fit.cost, *(one.fit.cost for one in step.candidates if one.fit)])
 

@@ -19,8 +19,8 @@ from .acceptance import better
 from .candidate_fits import CandidateFit, fit_candidates, screen_candidates
 from .even_fit import evenly_fitted
 from .fitted_model import Model, fit_model
+from .search_limit import search_is_over
 from .thresholds import THRESHOLDS
-from .time_limit import out_of_time
 
 
 class SelectionStep(NamedTuple):
@@ -82,7 +82,7 @@ def weighed(
     fits = {one.addition.key for one in found if one.fit}
     for _ in range(noises):
         larger = done.before is not model
-        if out_of_time() or (larger and done.best is None):  # nothing counts: in a larger noise yet, still less does
+        if search_is_over() or (larger and done.best is None):  # nothing counts: in a larger noise yet, still less does
             break
         noisier = _noise_left_by(done, model.records)
         if larger and _as_loud(noisier, done.before.records):

@@ -29,8 +29,8 @@ from ..parameterization.model_terms import additions_of
 from ..residuals.residuals import Residuals, analyse, rms
 from .assumptions import CELLS
 from .fitted_model import Model, fit_given, fit_model
+from .search_limit import search_is_over
 from .thresholds import THRESHOLDS
-from .time_limit import out_of_time
 
 BETWEEN = 12.0**-0.5
 """Standard deviation, in samples, of an instant between two of them."""
@@ -228,7 +228,7 @@ class MotionStart:
     ) -> tuple[Shift, ...]:
         """As far as steps of so many samples lead."""
         before = None
-        while best != before and not out_of_time():
+        while best != before and not search_is_over():
             before = best
             for which in [*self.each, tuple(range(len(best)))]:
                 best = min((best, _moved(best, which, -step), _moved(best, which, step)), key=unlikely)
