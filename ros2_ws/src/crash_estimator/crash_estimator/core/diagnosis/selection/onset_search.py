@@ -13,6 +13,8 @@ from ...structure import Structure
 from ..observation.pace import at_its_own_pace
 from ..observation.record import ObservedRecord, observe
 from ..observation.rest import rests_of
+from ..output_error.gauss_newton import fit
+from ..output_error.problem import make_problem
 from ..parameterization.magnitudes import measure_magnitudes
 from ..residuals.residuals import Residuals, analyse
 from .acceptance import share_removed
@@ -147,8 +149,9 @@ class _Search:
         for one in candidates(magnitudes, self.effects, present):
             if one.target == element:
                 laws.setdefault((one.effect.name, one.variant), one)
-        models = [fit_model(magnitudes, records, (*present, law)) for law in laws.values()]
-        return [model.additions[len(present) :] for model in sorted(models, key=_rms)[: THRESHOLDS.few]]
+        fits = {key: fit(make_problem(magnitudes, records, (*present, law))) for key, law in laws.items()}
+        leaves = {key: analyse(one).rms for key, one in fits.items()}
+        return [[laws[key]] for key in sorted(leaves, key=leaves.__getitem__)[: THRESHOLDS.few]]
 
     def _rest_until(self, shifts: Sequence[Shift]) -> bool:
         """Whether the signals rest from the stated time zeros until then: what moves is not to be left out."""
@@ -173,10 +176,6 @@ class _Search:
     def _observed(self, shifts: Sequence[Shift] = ()) -> list[ObservedRecord]:
         moved = [at_its_own_pace(self.structure, one) for one in moved_by(shifts, self.recordings)]
         return [observe(self.structure, *each) for each in zip(moved, rests_of(moved), strict=True)]
-
-
-def _rms(model: Model) -> float:
-    return model.residuals.rms
 
 
 def _left_by(path: SelectionPath) -> Residuals:
