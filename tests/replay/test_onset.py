@@ -77,8 +77,24 @@ def test_import_finds_it_and_says_so(tmp_path, capsys):
     assert main([str(tmp_path / "late.mcap"), "--to", str(tmp_path / "a.mcap")]) == 0
     assert "the signals begin -3 ms from the stated time zero (barrier_fx" in capsys.readouterr().out
     assert main([str(tmp_path / "late.mcap"), "--to", str(tmp_path / "b.mcap"), "--time-zero", "auto"]) == 0
-    assert "time zero moved to the onset, -3 ms from the stated one" in capsys.readouterr().out
+    assert "time zero moved by -3 ms from the stated one: to the onset" in capsys.readouterr().out
     assert_array_equal(read_bag(tmp_path / "b.mcap").time_ns, read_bag(BAGS / "frontal_single.mcap").time_ns)
+
+
+def test_import_moves_it_by_a_stated_time(tmp_path, capsys):
+    late = shifted(read_bag(BAGS / "frontal_single.mcap"), 3.0)
+    write_bag(late, tmp_path / "late.mcap")
+    source, bag = str(tmp_path / "late.mcap"), tmp_path / "a.mcap"
+    for wrong, said in (("soon", "stated, auto or a number"), ("nan", "seconds, got 'nan'")):
+        with pytest.raises(SystemExit):
+            main([source, "--to", str(bag), "--time-zero", wrong])
+        assert said in capsys.readouterr().err
+    assert main([source, "--to", str(bag), "--time-zero", "9"]) == 1
+    assert "--time-zero 9 is outside the recording, which lasts from" in capsys.readouterr().err
+    assert main([source, "--to", str(bag), "--time-zero", "-0.003"]) == 0
+    said = capsys.readouterr().out
+    assert "time zero moved by -3 ms from the stated one" in said and "the signals begin" not in said
+    assert_array_equal(read_bag(bag).time_ns, read_bag(BAGS / "frontal_single.mcap").time_ns)
 
 
 def test_where_there_is_none_it_is_one_line(tmp_path):

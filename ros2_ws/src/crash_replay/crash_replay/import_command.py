@@ -1,6 +1,7 @@
 """`import SOURCE --to BAG`: a recording of any known form becomes a bag; says what was done and what was left out."""
 
 import argparse
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -36,6 +37,18 @@ def _run(given: argparse.Namespace) -> None:
     run(given)
 
 
+def _time_zero(text: str) -> str | float:
+    if text in ("stated", "auto"):
+        return text
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not math.isfinite(seconds):
+        raise argparse.ArgumentTypeError(f"stated, auto or a number of seconds, got {text!r}")
+    return seconds
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="import",
@@ -49,8 +62,9 @@ def _parser() -> argparse.ArgumentParser:
         "--to", type=Path, required=True, metavar="BAG", help="rosbag2 folder, or one file if it ends in .mcap"
     )
     parser.add_argument(
-        "--time-zero", choices=("stated", "auto"), default="stated",
-        help="auto: the impact is where the signals leave their rest, not where the recording states it",
+        "--time-zero", type=_time_zero, metavar="stated|auto|S", default="stated",
+        help="where the impact is. auto: where the signals leave their rest; S: so many seconds after the stated zero, "
+        "as `diagnose` says it; default: as the recording states it",
     )  # fmt: skip
     parser.add_argument("--offset", action="store_true", help="remove each channel's mean before the impact")
     parser.add_argument(

@@ -10,7 +10,7 @@ from .bag import write_bag
 from .conditioning import filter_recording, remove_offset, select_channels
 from .foreign_text import visible
 from .import_report import found, import_report
-from .onset import at_onset, onset_note
+from .onset import at_onset, moved_time_zero, onset_note
 from .output import check_outputs, write_text
 from .readers import read_source
 from .recording import Recording
@@ -44,8 +44,10 @@ def import_recording(given: argparse.Namespace) -> Recording:
         recording = select_channels(recording, given.channels)
     if given.time_zero == "auto":
         recording = at_onset(recording)
+    elif given.time_zero != "stated":
+        recording = moved_time_zero(recording, round(given.time_zero * 1e9), "as stated with --time-zero")
     doubts = (*gaps_in_time(recording), *doubtful_channels(recording))  # before a filter smooths the signs away
-    if doubt := onset_note(recording):
+    if given.time_zero in ("stated", "auto") and (doubt := onset_note(recording)):
         doubts += (doubt,)
     recording = replace(recording, test=replace(recording.test, notes=recording.test.notes + doubts))
     if given.offset:

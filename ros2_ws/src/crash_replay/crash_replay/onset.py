@@ -140,9 +140,22 @@ def at_onset(recording: Recording) -> Recording:
             f"test {recording.test.id}: no onset found: no acceleration or force is at rest in the first "
             f"{AT_REST * 1e3:g} ms and wakes later; leave the time zero as it is stated"
         )
-    note = f"time zero moved to the onset, {onset.time_ns * 1e-6:+.4g} ms from the stated one ({_seen(onset)})"
+    return moved_time_zero(recording, onset.time_ns, f"to the onset ({_seen(onset)})")
+
+
+def moved_time_zero(recording: Recording, by_ns: int, why: str) -> Recording:
+    """With time zero so much later; the notes say so.
+
+    Raises RecordingError where that is outside the recording.
+    """
+    if not recording.time_ns[0] <= by_ns < recording.time_ns[-1]:
+        raise RecordingError(
+            f"test {recording.test.id}: --time-zero {by_ns * 1e-9:g} is outside the recording, which lasts from "
+            f"{recording.time_ns[0] * 1e-9:g} to {recording.time_ns[-1] * 1e-9:g} s"
+        )
+    note = f"time zero moved by {by_ns * 1e-6:+.4g} ms from the stated one: {why}"
     test = replace(recording.test, notes=(*recording.test.notes, note))
-    return Recording(test, recording.time_ns - onset.time_ns, recording.values)
+    return Recording(test, recording.time_ns - by_ns, recording.values)
 
 
 def onset_note(recording: Recording) -> str:
