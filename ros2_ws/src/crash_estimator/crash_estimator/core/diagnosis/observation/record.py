@@ -235,6 +235,18 @@ def observe(structure: Structure, recording: Recording, rest: Rest | None = None
     return record.in_band(np.inf)
 
 
+def refuse_dead_channels(structure: Structure, recording: Recording) -> None:
+    """Raises ModelError for a measured output that never changes: it has no noise to compare a model with."""
+    for name in [output.channel for output in outputs_of(structure)]:
+        values = recording.column(name)[np.isfinite(recording.column(name))]
+        if len(values) and values[0] != 0.0 and np.ptp(values) == 0.0:
+            unit = recording.test.channels[recording.test.index(name)].unit
+            raise ModelError(
+                f"test {recording.test.id}: channel {name} is {values[0]:g} {unit} throughout, as of a dead sensor: "
+                "leave it out of the model file"
+            )
+
+
 def _signal(recording: Recording, name: str, grid: np.ndarray, rest: Rest) -> Signal:
     valid = np.isfinite(recording.column(name))
     if not valid.any():

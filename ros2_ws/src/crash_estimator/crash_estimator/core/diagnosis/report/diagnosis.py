@@ -10,6 +10,7 @@ from ...derived_motion import with_accelerations
 from ...effects import EFFECTS
 from ...effects.effect import Addition, Effect
 from ...structure import ModelError, Structure
+from ..observation.record import refuse_dead_channels
 from ..residuals.in_band import in_band
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import analyse, free_run, noise_floor
@@ -106,13 +107,16 @@ def diagnose(
         raise ModelError("a diagnosis needs at least one recording")
     recordings, clipped = without_clipped(recordings)
     structure, recordings = with_accelerations(structure, recordings)
+    for recording in recordings:
+        refuse_dead_channels(structure, recording)
     with search_limit(seconds):
         begun = select_from_the_onset(structure, recordings, effects)
         stopped = search_is_over()
     found = _answer(structure, begun.path, tolerance, begun.zero)
     remarks = [clipped] if clipped else []
-    if begun.unused:
-        remarks.append(signals_begin({shift.test: shift.seconds for shift in begun.unused}))
+    elsewhere = {shift.test: shift.seconds for shift in begun.unused if shift.off(0.0)}  # whatever a filter shows early
+    if elsewhere:
+        remarks.append(signals_begin(elsewhere))
     if stopped:
         remarks.append(f"stopped after {limit_text(seconds)}: not everything was tried")
     return replace(found, stopped=stopped, text="; ".join([found.text, *remarks]))
