@@ -10,7 +10,7 @@ from ..selection.time_zero import TimeZero
 from .ranking import Ranked, StepReport
 
 TIME_ZERO = "time_zero"
-"""As the steps name it: no effect of a model but an error of a recording, mended by `import --time-zero auto`."""
+"""As the steps name it: no effect of a model but an error of a recording, mended by `import --time-zero S`."""
 
 
 def time_zero_step(zero: TimeZero, moved: Model, free_run_rms: tuple[float, float]) -> StepReport:

@@ -36,7 +36,7 @@ def verdict_text(
     said = "; with ".join([said, *_contacts_otherwise(structure, final.fit.layout.structure)])
     if steps and steps[0].effect == TIME_ZERO:
         moved = steps[0].shape or {steps[0].target: steps[0].coefficient}
-        said += f"; {signals_begin(moved)}: `import --time-zero auto` moves it"
+        said += f"; {signals_begin(moved)}: `import --time-zero S` moves it, by so many s"
     return said
 
 

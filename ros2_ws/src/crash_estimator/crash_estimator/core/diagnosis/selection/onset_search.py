@@ -55,15 +55,22 @@ class _Search:
     effects: Mapping[str, Effect]
 
     def from_early_onsets(self) -> Begun:
-        """From the stated time zeros on, or from an onset where that comes first and the model leaves less so."""
-        records, elsewhere = self._observed(), onsets(self.recordings)
-        early = tuple(shift for shift in elsewhere if shift.seconds < -records[shift.recording].seen_early)
+        """From the stated time zeros on, or from an onset where that comes first and the model leaves less so, unless
+        what is found from the stated ones leaves noise and what is found from there does not."""
+        records = self._observed()
+        begins = onsets(self.recordings)
+        elsewhere = tuple(shift._replace(early=records[shift.recording].seen_early) for shift in begins)
+        early = tuple(shift for shift in elsewhere if shift.off(0.0) > 0.0)
         if early:
             from_onset, common = self._observed(early), common_effects(self.structure, self.effects)
             zero = time_zero_wrong(self.structure, records, from_onset, early, common)
             if zero:
                 unused = tuple(shift for shift in elsewhere if shift not in early)
-                return Begun(self._selected(from_onset), zero, unused)
+                found = Begun(self._selected(from_onset), zero, unused)
+                if found.path.noise or search_is_over():
+                    return found
+                stated = self._selected(records)
+                return Begun(stated, None, elsewhere) if stated.noise else found
         return Begun(self._selected(records), None, elsewhere)
 
     def from_sharper_onsets(self, found: Begun) -> Begun | None:
@@ -71,9 +78,11 @@ class _Search:
         law in its place: the first that leaves noise, as what was found does not, or does with more effects; or else
         the one that leaves much less of more. Only from where next to nothing may be left."""
         path, zero, unused = found
-        begins = onsets(self.recordings, as_well=True)
         lacks_nothing = path.final.white and not (path.added or zero)
-        if lacks_nothing or not begins or (path.noise and not (zero or (unused and len(path.added) > 1))):
+        if lacks_nothing or (path.noise and not (zero or (unused and len(path.added) > 1))):
+            return None
+        begins = onsets(self.recordings, [record.seen_early for record in self._observed()])
+        if not begins:
             return None
         used = {shift.recording: shift.seconds for shift in zero.shifts} if zero else {}
         shifts = tuple(shift._replace(seconds=used.get(shift.recording, 0.0)) for shift in begins)
@@ -126,8 +135,8 @@ class _Search:
         found = sharpened(begins, taken, path.structure, choices, self._observed, _left_by(path).rms)
         if found is None:
             return ()
-        saves = len(path.added) > 1 or most == 0  # one effect leaves as little as several
-        gains = found.of_residuals >= -THRESHOLDS.gain and (saves or found.gain > THRESHOLDS.gain)
+        needs_fewer = len(path.added) > 1 or most == 0  # what is left from there on decides
+        gains = needs_fewer or (found.of_residuals >= -THRESHOLDS.gain and found.gain > THRESHOLDS.gain)
         return found.shifts if gains and found.mean_square < THRESHOLDS.near_floor else ()
 
     def _sharper_by_other_laws(
@@ -154,11 +163,12 @@ class _Search:
         return [[laws[key]] for key in sorted(leaves, key=leaves.__getitem__)[: THRESHOLDS.few]]
 
     def _rest_until(self, shifts: Sequence[Shift]) -> bool:
-        """Whether the signals rest from the stated time zeros until then: what moves is not to be left out."""
+        """Whether the signals rest from the stated time zeros until then, or until a filter may show what comes: what
+        moves is not to be left out."""
         stated = self._observed()
         for shift in shifts:
             record = stated[shift.recording]
-            before = record.measured[record.time[record.at] < shift.seconds]
+            before = record.measured[record.time[record.at] < shift.seconds - shift.early]
             if len(before) and np.isfinite(before).any(axis=0).all():
                 std = np.hypot(record.noise / np.sqrt(len(before)), record.offset_std)
                 if (np.abs(np.nanmean(before, axis=0)) > FARTHEST * std).any():

@@ -56,6 +56,12 @@ class Shift(NamedTuple):
     std: float  # s
     period: float  # s, of its samples
     differs: bool = True  # from the stated one by more than it can be wrong
+    early: float = 0.0  # s by which its sensors' filter may show the motion before it begins
+
+    def off(self, seconds: float) -> float:
+        """s by which a motion that begins then is off this onset: it may begin as much later as the filter is early."""
+        late = seconds - self.seconds
+        return late - min(max(late, 0.0), self.early)
 
 
 class TimeZero(NamedTuple):
@@ -85,17 +91,18 @@ class Sharpened(NamedTuple):
     mean_square: float  # that is left from there on, in units of the noise
 
 
-def onsets(recordings: Sequence[Recording], as_well: bool = False) -> tuple[Shift, ...]:
-    """Of the recordings whose signals begin elsewhere than at the stated time zero; as_well: or that may do so."""
+def onsets(recordings: Sequence[Recording], early: Sequence[float] = ()) -> tuple[Shift, ...]:
+    """Of the recordings whose signals begin elsewhere than at the stated time zero; early: or where the motion may, as
+    each one's filter shows it up to so many seconds before it begins."""
     shifts = []
     for k, recording in enumerate(recordings):
         onset, period = find_onset(recording), recording.sample_period
         if onset is None:
             continue
         seconds, precision = onset.time_ns * 1e-9, onset.precision_ns * 1e-9
-        if onset.differs or (as_well and abs(seconds) > period):
+        if onset.differs or (early and max(abs(seconds), early[k]) > period):
             std = max(precision * AS_WELL**-0.5, period * BETWEEN)
-            shifts.append(Shift(k, recording.test.id, seconds, std, period, onset.differs))
+            shifts.append(Shift(k, recording.test.id, seconds, std, period, onset.differs, early[k] if early else 0.0))
     return tuple(shifts)
 
 
@@ -176,7 +183,7 @@ class MotionStart:
     def of_both(self, shifts: Sequence[Shift], rms: float) -> float:
         """Twice the negative logarithm of the likelihood of what is left and of the onsets, less constants."""
         pairs = zip(shifts, self.onsets, strict=True)
-        off = sum(((one.seconds - onset.seconds) / onset.std) ** 2 for one, onset in pairs)
+        off = sum((onset.off(one.seconds) / onset.std) ** 2 for one, onset in pairs)
         return 2.0 * self.bins * float(np.log(rms)) + off if np.isfinite(rms) else np.inf
 
     def unlikely(self, shifts: tuple[Shift, ...]) -> float:
@@ -190,7 +197,7 @@ class MotionStart:
     def _left_from(self, left_by: Callable[..., Residuals], shifts: tuple[Shift, ...]) -> Residuals | _Nothing:
         """left_by(magnitudes, records, additions)."""
         pairs = zip(shifts, self.onsets, strict=True)
-        if any(abs(one.seconds - onset.seconds) > abs(onset.seconds) + FARTHEST * onset.std for one, onset in pairs):
+        if any(abs(onset.off(one.seconds)) > abs(onset.seconds) + FARTHEST * onset.std for one, onset in pairs):
             return _Nothing()
         try:
             records = self.observed(shifts)
