@@ -9,7 +9,6 @@ from numba import njit
 
 from ..kinematics import FEWEST
 from ..regressor_errors import ONE_SIDED, TWO_SIDED
-from .short_loops import short_loops
 
 
 @njit(cache=True, inline="always")
@@ -133,7 +132,6 @@ def pass_on(whole, shared, gain, gradient, by_errors, n):
 
     As in `pass_one`, with G for g and V (q, q) for v: S + G D' + D G', D = C + G V / 2.
     """
-    short_loops()
     w, q = gain.shape
     bodies = by_errors.shape[2]
     room = np.zeros((q, w + q + 3))  # one piece of memory is found sooner than three

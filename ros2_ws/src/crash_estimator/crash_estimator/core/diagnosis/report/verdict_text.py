@@ -6,6 +6,7 @@ from crash_replay.gravity import G
 
 from ...structure import Structure
 from ...structure_parts import ALL, SPRINGS
+from ..parameterization.layout import WEIGHED_TO
 from ..selection.fitted_model import Model
 from ..selection.thresholds import THRESHOLDS
 from .left import Left, vibration_of
@@ -33,7 +34,8 @@ def verdict_text(
     below = final.records[0].below
     if below < float("inf"):
         said += f"; what rings above {below:g} Hz, {vibration_of(final) / G:.3g} g, is left out"
-    said = "; with ".join([said, *_contacts_otherwise(structure, final.fit.layout.structure)])
+    masses = _masses_otherwise(final) if evidence.noise else []
+    said = "; with ".join([said, *_contacts_otherwise(structure, final.fit.layout.structure), *masses])
     if steps and steps[0].effect == TIME_ZERO:
         moved = steps[0].shape or {steps[0].target: steps[0].coefficient}
         said += f"; {signals_begin(moved)}: `import --time-zero S` moves it, by so many s"
@@ -48,6 +50,18 @@ def _contacts_otherwise(given: Structure, assumed: Structure) -> list[str]:
     lasting = {a.acts_when_spent for g, a in pairs if g.acts_when_spent != a.acts_when_spent}
     found += [f"{LASTING[what]} beside a spring that is spent, as long as there is crush" for what in lasting]
     return found
+
+
+def _masses_otherwise(final: Model) -> list[str]:
+    """Of the masses those that had to be taken otherwise than stated by more than scales usually miss, twice over."""
+    layout, theta = final.fit.layout, final.fit.theta
+    off = {layout.bodies[k]: float(theta[parameter]) for k, parameter in layout.weighed.items()}
+    words = [
+        f"{name} {100.0 * abs(share):.2g} % {'heavier' if share > 0.0 else 'lighter'}"
+        for name, share in off.items()
+        if abs(share) > 2.0 * WEIGHED_TO
+    ]
+    return [f"{' and '.join(words)} than stated"] if words else []
 
 
 def _adequate(evidence: Evidence, tolerance: Tolerance, final: Model, floor: float) -> str:
