@@ -53,7 +53,8 @@ def _contacts_otherwise(given: Structure, assumed: Structure) -> list[str]:
 
 
 def _masses_otherwise(final: Model) -> list[str]:
-    """Of the masses those that had to be taken otherwise than stated by more than scales usually miss, twice over."""
+    """Of the masses those that had to be taken otherwise than stated, by more than two standard deviations of what a
+    mass is known to: one right mass in twenty would be."""
     layout, theta = final.fit.layout, final.fit.theta
     off = {layout.bodies[k]: float(theta[parameter]) for k, parameter in layout.weighed.items()}
     words = [

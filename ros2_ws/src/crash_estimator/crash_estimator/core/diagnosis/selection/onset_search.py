@@ -128,14 +128,14 @@ class _Search:
         others: Sequence[Sequence[Addition]] = (),
     ) -> tuple[Shift, ...]:  # fmt: skip
         """Where the motion with the first effect of a path begins, or what came nearest to one, or with others in its
-        place; none where that gains too little."""
+        place; none where that leaves more than next to nothing, or, with as many effects, gains too little."""
         present, best = path.final.additions[: path.present], path.steps[0].best
         first = path.added[:1] or ([as_found(best)] if best else [])
         choices = [(*present, *one) for one in (first[: min(most, 1)], *others)]
         found = sharpened(begins, taken, path.structure, choices, self._observed, _left_by(path).rms)
         if found is None:
             return ()
-        needs_fewer = len(path.added) > 1 or most == 0  # what is left from there on decides
+        needs_fewer = len(path.added) > 1 or most == 0  # what is found from there on decides
         gains = needs_fewer or (found.of_residuals >= -THRESHOLDS.gain and found.gain > THRESHOLDS.gain)
         return found.shifts if gains and found.mean_square < THRESHOLDS.near_floor else ()
 
