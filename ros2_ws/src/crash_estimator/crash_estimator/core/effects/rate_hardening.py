@@ -3,6 +3,9 @@
     h = V^(1/q)             Cowper and Symonds 1957; the exponent q is found
     h = ln(V / V0) >= 0     form `logarithmic`, Johnson and Cook 1983; the reference rate V0 in m/s is found
 
+Forms `uneven` and `uneven_logarithmic`, as of laws that are written in |V|: on the way back, where V < 0, the factor is
+1 + c rebound h(-V). With a `rebound` of 1 the force is as much larger whichever way the element moves.
+
 The coefficient is D, the rate in m/s that doubles the force: 1 + (V / D)^(1/q), or 1 + ln(V / V0) / ln(D / V0). The
 fit works with c, in which the force is linear: c = 0 is no hardening, D infinite.
 """
@@ -13,13 +16,18 @@ from ..structure import ModelError
 from .base import Shape, StaticFactor
 
 
-def factor(rate: np.ndarray, exponent: float | None = None, reference_rate: float | None = None) -> np.ndarray:
+def factor(
+    rate: np.ndarray, exponent: float | None = None, reference_rate: float | None = None, rebound: float = 0.0
+) -> np.ndarray:
+    way, speed = np.where(rate > 0.0, 1.0, rebound), np.abs(rate)
     if reference_rate is not None:
-        return np.log(np.maximum(rate / reference_rate, 1.0))
-    return np.maximum(rate, 1e-9) ** (1.0 / exponent) * (rate > 0.0)
+        return way * np.log(np.maximum(speed / reference_rate, 1.0))
+    return way * np.maximum(speed, 1e-9) ** (1.0 / exponent)
 
 
-def stated(c: float, exponent: float | None = None, reference_rate: float | None = None) -> float:
+def stated(
+    c: float, exponent: float | None = None, reference_rate: float | None = None, rebound: float = 0.0
+) -> float:
     if c <= 0.0:
         return np.inf
     if reference_rate is not None:
@@ -28,7 +36,9 @@ def stated(c: float, exponent: float | None = None, reference_rate: float | None
     return c**-exponent
 
 
-def unstated(value: float, exponent: float | None = None, reference_rate: float | None = None) -> float:
+def unstated(
+    value: float, exponent: float | None = None, reference_rate: float | None = None, rebound: float = 0.0
+) -> float:
     if reference_rate is None:
         return value ** (-1.0 / exponent)
     if value <= reference_rate:
@@ -42,9 +52,18 @@ def unstated(value: float, exponent: float | None = None, reference_rate: float 
 EFFECT = StaticFactor(
     "rate_hardening",
     "m/s",
-    {"exponent": Shape("", 0.7, 10.0, (1.0, 3.0)), "reference_rate": Shape("m/s", 1e-3, 10.0, (0.03, 1.0))},
+    {
+        "exponent": Shape("", 0.7, 10.0, (1.0, 3.0)),
+        "reference_rate": Shape("m/s", 1e-3, 10.0, (0.03, 1.0)),
+        "rebound": Shape("", 0.2, 5.0, (1.0,)),
+    },
     factor=factor,
     stated=stated,
     unstated=unstated,
-    forms={"": ("exponent",), "logarithmic": ("reference_rate",)},
+    forms={
+        "": ("exponent",),
+        "logarithmic": ("reference_rate",),
+        "uneven": ("exponent", "rebound"),
+        "uneven_logarithmic": ("reference_rate", "rebound"),
+    },
 )

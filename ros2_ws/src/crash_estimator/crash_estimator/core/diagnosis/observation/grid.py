@@ -45,9 +45,8 @@ def bins_of(
     bin_[at] = np.arange(len(at)) // per_bin
     bins = int(bin_.max()) + 1
     ok = np.isfinite(measured).astype(float)
-    ok[time[at] < max(mixed, 1e-9)] = (
-        0.0  # at the very impact forces may jump: on which side this sample lies is chance
-    )
+    # at the impact forces may jump: within a sample of the stated time zero it is chance on which side one lies
+    ok[time[at] < max(mixed, 0.5 * period)] = 0.0
     count = np.zeros((bins, measured.shape[1]))
     np.add.at(count, bin_[at], ok)
     valid = np.zeros((len(time), measured.shape[1]))

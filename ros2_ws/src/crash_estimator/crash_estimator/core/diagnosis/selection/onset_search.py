@@ -76,10 +76,12 @@ class _Search:
     def from_sharper_onsets(self, found: Begun) -> Begun | None:
         """From the onsets, then from where the motion with the first effect that was found begins, then with another
         law in its place: the first that leaves noise, as what was found does not, or does with more effects; or else
-        the one that leaves much less of more. Only from where next to nothing may be left."""
+        the one that leaves much less of more. Only from where next to nothing may be left. Channels that are all late
+        are a time zero that is early, however gently the motion rises out of the noise."""
         path, zero, unused = found
         lacks_nothing = path.final.white and not (path.added or zero)
-        if lacks_nothing or (path.noise and not (zero or (unused and len(path.added) > 1))):
+        several = len(path.added) > 1 and (unused or all(one.effect.distorts == "delay" for one in path.added))
+        if lacks_nothing or (path.noise and not (zero or several)):
             return None
         begins = onsets(self.recordings, [record.seen_early for record in self._observed()])
         if not begins:
