@@ -112,8 +112,9 @@ def test_the_logarithmic_rate_doubles_the_force_too_and_counts_from_its_referenc
 
 
 def test_the_limits_are_physical():
-    """Damping and stiffness never negative; a delay within 1 ms, gains and stated speeds within 10 %, offsets 5 g."""
-    signed = {"constant_force", "initial_velocity", "channel_gain", "channel_offset", "force_offset"}
+    """Damping and stiffness never negative; a delay within 1 ms, gains and stated speeds within 10 %, offsets 5 g; a
+    body may be heavier than stated, or lighter."""
+    signed = {"added_mass", "constant_force", "initial_velocity", "channel_gain", "channel_offset", "force_offset"}
     assert {name for name, effect in EFFECTS.items() if effect.low < 0.0} == signed
     assert EFFECTS["channel_delay"].high == pytest.approx(1e-3)
     assert (EFFECTS["channel_gain"].low, EFFECTS["channel_gain"].high) == pytest.approx((-0.1, 0.1))

@@ -30,7 +30,7 @@ def experiment():
     bodies = [SimpleNamespace(driven=False), SimpleNamespace(driven=True, acceleration=("left", "right"))]
     layout = SimpleNamespace(
         structure=SimpleNamespace(bodies=bodies), bodies=("car", "door"), terms=terms, attached={},
-        modes=({1: FIRST_MODE},),
+        modes=({1: range(FIRST_MODE, len(THETA))},),
     )  # fmt: skip
     signals = {
         name: SimpleNamespace(time=TIME, values=values, on_grid=values)

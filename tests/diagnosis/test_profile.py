@@ -16,7 +16,7 @@ from crash_estimator.core.diagnosis.report.diagnosis import diagnose
 from crash_estimator.core.diagnosis.selection.candidates import candidates
 from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
 from crash_estimator.core.effects import EFFECTS
-from crash_estimator.core.effects.kinds.body_inertia import WEIGHED
+from crash_estimator.core.effects.kinds.body_inertia import LEFT_OUT, WEIGHED
 from crash_estimator.model_file import ModelFile
 from crash_replay.synthetic.hidden.cases import draw_case
 
@@ -67,10 +67,10 @@ def test_a_mass_stands_as_it_was_weighed_where_a_law_does_as_well():
     """One body, its motion alone measured: with a slope known for its pad, a body half as heavy again does as well, and
     so does a pad that yields."""
     hidden, structure, recordings = drawn("impactor", 420012, 0.5)
-    first, second, *_ = diagnose(structure, recordings).ranking
+    first, *rivals = diagnose(structure, recordings).ranking
     assert (first.effect, first.target) == (hidden.effect, hidden.target)
-    assert (second.effect, second.target) == ("added_mass", "impactor")
-    assert first.confounded_with == ("added_mass on impactor", "yielding on padding")
+    as_good = {"added_mass on impactor", "yielding on padding"}  # a quarter of a nat apart
+    assert {one.name for one in rivals[:2]} == set(first.confounded_with) == as_good
 
 
 def test_a_mass_is_believed_like_any_effect_where_a_force_or_another_body_is_measured():
@@ -78,10 +78,11 @@ def test_a_mass_is_believed_like_any_effect_where_a_force_or_another_body_is_mea
     records = [observe(structure, recording) for recording in recordings]
     magnitudes = measure_magnitudes(structure, records, CELLS)
     offered = {a.effect.name: a for a in candidates(magnitudes, EFFECTS)}
-    assert offered["added_mass"].effect.log_prior_odds_against(structure) == WEIGHED
-    assert offered["plastic_unloading"].effect.log_prior_odds_against(structure) == 0.0
+    assert offered["added_mass"].effect.log_prior_odds_against(structure, 1.0) == WEIGHED
+    assert offered["plastic_unloading"].effect.log_prior_odds_against(structure, 1.0) == 0.0
     impactor, face = structure.bodies
     measured = replace(structure, bodies=(impactor, replace(face, force="face_fx")))
-    assert offered["added_mass"].effect.log_prior_odds_against(measured) == 0.0
+    assert offered["added_mass"].effect.log_prior_odds_against(measured, 1.0) == 0.0
     two = replace(structure, bodies=(impactor, replace(impactor, name="other", acceleration=("other_ax",)), face))
-    assert offered["added_mass"].effect.log_prior_odds_against(two) == 0.0
+    assert offered["added_mass"].effect.log_prior_odds_against(two, 1.0) == 0.0
+    assert offered["added_mass"].effect.log_prior_odds_against(two, -1.0) == LEFT_OUT

@@ -106,7 +106,8 @@ def test_the_derivatives_of_a_factor_on_a_spring_are_those_of_its_law(name):
 )
 def test_two_laws_are_not_told_apart_within_ten_nats_or_half_a_percent_of_what_both_explain(one, other, rivals):
     """A hysteresis was told as an unloading line, 12 nats of 29547 ahead."""
-    effect = SimpleNamespace(log_prior_odds_against=lambda structure: 0.0)
-    fit = SimpleNamespace(layout=SimpleNamespace(structure=None))
+    effect = SimpleNamespace(log_prior_odds_against=lambda structure, c: 0.0)
+    layout = SimpleNamespace(structure=None, term=lambda addition: SimpleNamespace(coefficient=0))
+    fit = SimpleNamespace(layout=layout, theta=[1.0])
     candidates = [CandidateFit(SimpleNamespace(effect=effect), gain, fit) for gain in (one, other)]
     assert ranking._confounded(*candidates) == rivals

@@ -17,7 +17,7 @@ def layout(knots: np.ndarray, high: float = np.inf) -> SimpleNamespace:
     size = n + 2 + 2 + DRIVEN_MODES + 1
     return SimpleNamespace(
         links=[SimpleNamespace(name="spring", curve=curve), SimpleNamespace(name="rope", curve=None)],
-        knots=n, common=n + 2, offsets=(n + 2,), outputs=("one", "other"), modes=({1: n + 4},), size=size,
+        knots=n, common=n + 2, offsets=(n + 2,), outputs=("one", "other"), modes=({1: range(n + 4, size)},), size=size,
         start=np.zeros(size), prior=SimpleNamespace(low=np.full(size, -np.inf), high=np.full(size, high)),
     )  # fmt: skip
 

@@ -212,9 +212,13 @@ class Effect:
         """The addition with further free parameters, which are tried once it is a candidate."""
         return []
 
-    def log_prior_odds_against(self, structure: Structure) -> float:
-        """Nats that it must gain over other candidates, where no measurement can tell them apart."""
+    def log_prior_odds_against(self, structure: Structure, c: float) -> float:
+        """Nats that it must gain with the coefficient c over others, where no measurement can tell them apart."""
         return 0.0
+
+    def is_doubt(self, structure: Structure, addition: "Addition", c: float) -> bool:
+        """Whether it is no more with the coefficient c than what is not known of a right model anyway."""
+        return False
 
     def stated(self, c: float, **shapes: float) -> float:
         """The coefficient as the literature states it."""

@@ -25,9 +25,7 @@ def factor(
     return way * np.maximum(speed, 1e-9) ** (1.0 / exponent)
 
 
-def stated(
-    c: float, exponent: float | None = None, reference_rate: float | None = None, rebound: float = 0.0
-) -> float:
+def stated(c: float, exponent: float | None = None, reference_rate: float | None = None, rebound: float = 0.0) -> float:
     if c <= 0.0:
         return np.inf
     if reference_rate is not None:

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects.effect import Addition
-from ..observation.grid import DRIVEN_MODES
 from ..observation.record import ObservedRecord
 from ..observation.trajectory import Trajectory, integrate
 from ..parameterization.experiment import Experiment
@@ -63,8 +62,8 @@ def driven_motion(experiment: Experiment, theta: np.ndarray) -> np.ndarray:
     for k, names in _driving(layout).items():
         for name in names:
             a[:, k] += true_acceleration(record, name, distortion(layout, theta, name)) / len(names)
-        first = layout.modes[r][k]
-        a[:, k] += record.cosines @ theta[first : first + DRIVEN_MODES + 1]
+        modes = layout.modes[r][k]
+        a[:, k] += record.cosines[:, : len(modes)] @ theta[modes]
     return a
 
 
@@ -83,8 +82,7 @@ def driven_by(experiment: Experiment, theta: np.ndarray) -> list[tuple[int, int,
                 signal, after, step = record.signals[name], record.time + d.delay, 0.5 * record.step
                 up, down = (np.interp(after + s * step, signal.time, signal.values) for s in (1.0, -1.0))
                 by.append((k, d.by_delay, share * (up - down) / (2.0 * step) / (1.0 + d.gain)))
-        first = layout.modes[r][k]
-        by += [(k, first + j, record.cosines[:, j]) for j in range(DRIVEN_MODES + 1)]
+        by += [(k, p, record.cosines[:, j]) for j, p in enumerate(layout.modes[r][k])]
     return by
 
 

@@ -46,7 +46,7 @@ def at_its_own_pace(structure: Structure, recording: Recording) -> Recording:
 
 
 def _averaged(recording: Recording, samples: int) -> Recording:
-    """Means of so many samples each."""
+    """Means of so many samples each; none of those at the impact, of which some may lie before a force that jumps."""
     first = int(np.count_nonzero(recording.time_ns < 0)) % samples  # a mean is of before the impact, or of after it
     used = (len(recording) - first) // samples * samples
     time_ns = recording.time_ns[first : first + used].reshape(-1, samples)
@@ -54,6 +54,7 @@ def _averaged(recording: Recording, samples: int) -> Recording:
     valid = np.isfinite(values)
     count = valid.sum(axis=1)
     mean = np.where(valid, values, 0.0).sum(axis=1) / np.where(count, count, np.nan)
+    mean[np.flatnonzero(time_ns[:, 0] >= 0)[:1]] = np.nan
     return replace(recording, time_ns=np.rint(time_ns.mean(axis=1)).astype(np.int64), values=mean)
 
 

@@ -7,7 +7,6 @@ parameters keep their meaning. The motion goes on as it was fitted, and as it is
 import numpy as np
 
 from ..mechanics.driven_motion import measured_motion, motion_of
-from ..observation.grid import DRIVEN_MODES
 from ..observation.trajectory import Trajectory
 from ..output_error.gauss_newton import Fit
 from ..output_error.problem import OutputErrorProblem, Point
@@ -34,9 +33,8 @@ def _parameters(last: Fit, layout: Layout) -> np.ndarray:
     for r, first in enumerate(layout.offsets):
         outputs = np.arange(len(layout.outputs))
         theta[first + outputs] = last.theta[old.offsets[r] + outputs]
-        for body, mode in layout.modes[r].items():
-            modes = np.arange(DRIVEN_MODES + 1)
-            theta[mode + modes] = last.theta[old.modes[r][body] + modes]
+        for body, modes in layout.modes[r].items():
+            theta[modes] = last.theta[old.modes[r][body]]
     return np.clip(theta, layout.prior.low, layout.prior.high)
 
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from ...effects.effect import Addition
 from ..mechanics.driven_motion import measured_motion, motion_of
-from ..observation.grid import DRIVEN_MODES
 from ..observation.record import ObservedRecord
 from ..observation.trajectory import Trajectory
 from ..parameterization.experiment import Experiment, experiments_of
@@ -103,6 +102,6 @@ def embedding(base: Layout, wide: Layout) -> np.ndarray:
         found += [wide.offsets[r] + q for q in range(len(base.outputs))]
         found += [wide.drifts[r][q] for q in base.drifts[r]]
         for body in base.modes[r]:
-            found += [wide.modes[r][body] + j for j in range(DRIVEN_MODES + 1)]
+            found += wide.modes[r][body]
         found += [wide.kicks[r][body] for body in base.kicks[r]]
     return np.array(found)

@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects.effect import Addition
+from ...effects.kinds.body_inertia import WEIGHED_TO
 from ...effects.kinds.guide_force import GROUND
 from ...structure import Coefficient, Structure
-from ..observation.grid import DRIVEN_MODES
+from ..observation.grid import ATTACHED_MODES, DRIVEN_MODES
 from ..observation.record import ObservedRecord, Output, comparable, outputs_of
 from ..observation.trajectory import Trajectory
 from .free_curve import ROUGHNESS, Curve, make_knots
@@ -24,10 +25,6 @@ from .terms import Link, Term
 FREE, DRIVEN, FIXED = 0, 1, 2
 """How a body moves: by forces, as its channels say, or not at all. The compiled passes know these codes."""
 
-
-WEIGHED_TO = 0.01
-"""Standard deviation of a mass, as a share of it: scales are better, but what of a structure moves with its sensor is
-hardly known to a percent. Ours, not varied: tests with masses off by 1 to 2 % were adequate with it."""
 
 DRIFT = 0.003
 """Of a channel's peak, standard deviation at the recording's end: the zero of an accelerometer that is shaken and warms
@@ -58,7 +55,7 @@ class Layout(NamedTuple):
     attached: dict[str, int]  # channel of an attached body -> its body
     offsets: tuple[int, ...]  # per record: first of its outputs' zero-offset errors
     drifts: tuple[dict[int, int], ...]  # per record, in doubt: output that is an acceleration -> its zero at the end
-    modes: tuple[dict[int, int], ...]  # per record: driven body -> first of its modes
+    modes: tuple[dict[int, range], ...]  # per record: driven body -> its modes, the mean first
     kicks: tuple[dict[int, int], ...]  # per record: body that starts as its own channel says -> error of its velocity
     weighed: dict[int, int]  # in doubt: free body -> relative error of its mass
     prior: Prior
@@ -250,17 +247,17 @@ def _bounded(b: Builder, name: str, std: float) -> int:
     return b.add(name, 0.0, std, low=-limit, high=limit)
 
 
-def _modes(b: Builder, structure: Structure, record: ObservedRecord, attached: dict[str, int]) -> dict[int, int]:
+def _modes(b: Builder, structure: Structure, record: ObservedRecord, attached: dict[str, int]) -> dict[int, range]:
     """Mean and slow cosines of each driven channel's noise; white noise spreads its variance evenly over them."""
     found = {}
-    driven = [(k, body.acceleration) for k, body in enumerate(structure.bodies) if body.driven]
+    driven = [(k, body.acceleration, DRIVEN_MODES) for k, body in enumerate(structure.bodies) if body.driven]
     samples = len(record.at)
-    for k, channels in driven + [(k, (channel,)) for channel, k in attached.items()]:
+    for k, channels, count in driven + [(k, (channel,), ATTACHED_MODES) for channel, k in attached.items()]:
         noise = np.sqrt(sum(record.signals[c].noise ** 2 for c in channels)) / len(channels)
         offset = np.sqrt(sum(record.signals[c].offset_std ** 2 for c in channels)) / len(channels)
-        found[k] = len(b.start)
+        found[k] = range(len(b.start), len(b.start) + 1 + count)
         b.add("mode", 0.0, np.hypot(offset, noise / np.sqrt(samples)))
-        for _ in range(DRIVEN_MODES):
+        for _ in range(count):
             b.add("mode", 0.0, noise * np.sqrt(2.0 / samples))
     return found
 

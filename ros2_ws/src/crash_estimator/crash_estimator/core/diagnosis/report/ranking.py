@@ -12,7 +12,7 @@ from ..output_error.gauss_newton import Fit
 from ..parameterization.experiment import Experiment
 from ..parameterization.terms import Term
 from ..residuals.residuals import analyse, noise_floor
-from ..selection.candidate_fits import CandidateFit
+from ..selection.candidate_fits import CandidateFit, odds_against
 from ..selection.fitted_model import Model
 from ..selection.selection_step import SelectionStep
 from ..selection.thresholds import THRESHOLDS
@@ -134,7 +134,7 @@ def _ranked(one: CandidateFit, before: Model, shown: list[CandidateFit]) -> Rank
 def _confounded(one: CandidateFit, other: CandidateFit) -> bool:
     """Whether the recordings hardly tell two fitted candidates apart: with or without what is held against a mass."""
     margin = max(THRESHOLDS.confounded, THRESHOLDS.form_errs * max(one.gain, other.gain))
-    gains = [(f.gain, f.gain + f.addition.effect.log_prior_odds_against(f.fit.layout.structure)) for f in (one, other)]
+    gains = [(f.gain, f.gain + odds_against(f.addition, f.fit)) for f in (one, other)]
     return any(abs(a - b) < margin for a, b in zip(*gains, strict=True))
 
 

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from crash_replay.gravity import G
 
+from ...effects.kinds.body_inertia import WEIGHED_TO
 from ...structure import Structure
 from ...structure_parts import ALL, SPRINGS
-from ..parameterization.layout import WEIGHED_TO
 from ..selection.fitted_model import Model
 from ..selection.thresholds import THRESHOLDS
 from .left import Left, vibration_of

@@ -210,9 +210,10 @@ class _Search:
         self._note(addition, fit(problem, start, schedule, hopeless))
 
     def _note(self, addition: Addition, found: Fit) -> None:
+        if addition.effect.is_doubt(found.layout.structure, addition, _coefficient(addition, found)):
+            return
         self.least = min(self.least, found.cost)
-        against = addition.effect.log_prior_odds_against(self.magnitudes.structure)
-        gain = found.evidence - self.model.fit.evidence - against
+        gain = found.evidence - self.model.fit.evidence - odds_against(addition, found)
         before = self.found.get(addition.key)
         if before is None or before.fit is None or _odds(addition, gain) > _odds(before.addition, before.gain):
             self.found[addition.key] = CandidateFit(addition, gain, found)
@@ -246,6 +247,15 @@ class _Search:
         rest = sorted((one for one in self.found.values() if not one.fit), key=lambda one: -one.gain)
         least = min((one.gain for one in fitted if one.gain > 0.0), default=0.0 if fitted else float("inf"))
         return fitted + [one._replace(gain=min(one.gain, least)) for one in rest]
+
+
+def odds_against(addition: Addition, fitted: Fit) -> float:
+    """Nats that it must gain over others, as it was fitted."""
+    return addition.effect.log_prior_odds_against(fitted.layout.structure, _coefficient(addition, fitted))
+
+
+def _coefficient(addition: Addition, fitted: Fit) -> float:
+    return float(fitted.theta[fitted.layout.term(addition).coefficient])
 
 
 def start_from(model: Model, problem: OutputErrorProblem, addition: Addition, screened: Screened | None) -> Point:

@@ -46,5 +46,5 @@ class GuideForce(ElementForce):
     def prior_std(self, magnitudes, addition):
         return HALF * magnitudes.body_force[magnitudes.structure.body_index[addition.target]]
 
-    def log_prior_odds_against(self, structure):
+    def log_prior_odds_against(self, structure, c):
         return PUSHED

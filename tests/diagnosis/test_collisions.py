@@ -1,0 +1,109 @@
+"""Two bodies that collide, integrated by a general solver: what is said of laws, masses and instants that the two
+simulators of the project do not draw."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import yaml
+from scipy.integrate import solve_ivp
+
+from crash_estimator.core.diagnosis import Diagnosis, diagnose
+from crash_estimator.core.structure import Structure
+from crash_estimator.model_file import ModelFile
+from crash_replay.recording import Channel, Recording, Test
+
+IMPACTOR, TARGET, STIFFNESS = 23.4, 12.0, 8e4  # kg, kg, N/m
+SPEEDS = (3.0, 6.0)  # m/s
+BEFORE, AFTER = 0.04, 0.06  # s
+
+
+def model(target: float = TARGET, damping: str = "0.0") -> Structure:
+    text = f"""
+    name: collision
+    bodies:
+      impactor: {{mass: {IMPACTOR}, acceleration: impactor_ax}}
+      target: {{mass: {target}, acceleration: target_ax}}
+    elements:
+      bumper:
+        between: [impactor, target]
+        stiffness: {{estimate: true, initial: 60000, min: 0, shape: constant}}
+        damping: {damping}
+        tension: none
+    """
+    return ModelFile.model_validate(yaml.safe_load(text)).structure()
+
+
+def collision(force: Callable, speed: float, rate: float, late: float = 0.0, noise: float = 0.005) -> Recording:
+    """force(crush m, rate of crush m/s) N while there is crush, never pulling; rate in Hz; late: s from the stated time
+    zero to the impact; noise: standard deviation over the peak. At the very impact nothing has been felt yet."""
+
+    def carried(x):
+        return np.where(x[0] > 0.0, np.maximum(force(np.maximum(x[0], 0.0), x[1]), 0.0), 0.0)
+
+    reduced = IMPACTOR * TARGET / (IMPACTOR + TARGET)
+    exactly = dict(dense_output=True, rtol=1e-9, atol=1e-12, max_step=1e-4)
+    way = solve_ivp(lambda t, x: (x[1], -float(carried(x)) / reduced), (0.0, AFTER), (0.0, speed), **exactly)
+    n = np.arange(round(-BEFORE * rate), round((AFTER - 0.01) * rate))
+    since = n / rate - late
+    f = np.where(since > 0.0, carried(way.sol(np.clip(since, 0.0, AFTER))), 0.0)
+    values = np.column_stack([-f / IMPACTOR, f / TARGET])
+    values += noise * np.abs(values).max(axis=0) * np.random.default_rng(int(speed)).standard_normal(values.shape)
+    channels = tuple(Channel(f"{body}_ax", "acceleration", body, "x") for body in ("impactor", "target"))
+    test = Test(f"{speed:g} m/s", channels, initial_velocity={"impactor": speed})
+    return Recording(test, np.rint(n * 1e9 / rate).astype(np.int64), values)
+
+
+def told(structure: Structure, force: Callable, rate: float = 1e4, **more) -> Diagnosis:
+    return diagnose(structure, [collision(force, speed, rate, **more) for speed in SPEEDS])
+
+
+def spring(crush, rate_of_crush):
+    return STIFFNESS * crush
+
+
+@pytest.mark.parametrize("rate", [1e4, 2e4])
+def test_a_force_that_jumps_at_the_impact_is_no_missing_effect(rate):
+    """Of 20 kHz means over three samples are compared: the first held one from before the jump, and a Maxwell element
+    of half a millisecond was told for it."""
+    damped = model(damping="{estimate: true, initial: 90, min: 0}")
+    found = told(damped, lambda x, v: STIFFNESS * x + 150.0 * v, rate)
+    assert found.verdict == "adequate" and not found.steps, found.text
+
+
+@pytest.mark.parametrize(
+    ("force", "form", "coefficient", "shape"),
+    [
+        (lambda x, v: STIFFNESS * x * (1.0 + (np.abs(v) / 10.0) ** 0.5), "uneven", 10.0, {"exponent": 2.0}),
+        (
+            lambda x, v: STIFFNESS * x * (1.0 + 0.12 * np.log(np.maximum(np.abs(v) / 0.1, 1.0))),
+            "uneven_logarithmic", 0.1 * np.exp(1.0 / 0.12), {"reference_rate": 0.1},
+        ),
+    ],
+)  # fmt: skip
+def test_rate_hardening_on_the_way_back_too_is_told_as_such(force, form, coefficient, shape):
+    """It was `unexplained`: the usual law is of loading only."""
+    found = told(model(), force)
+    (step,) = found.steps
+    assert (found.verdict, found.complete) == ("effect_missing", True), found.text
+    assert (step.effect, step.target, step.form) == ("rate_hardening", "bumper", form), found.text
+    assert abs(step.coefficient - coefficient) < 4.0 * step.std
+    (name, value) = next(iter(shape.items()))
+    assert abs(step.shape[name] / value - 1.0) < 0.1 and abs(step.shape["rebound"] - 1.0) < 0.05
+
+
+@pytest.mark.parametrize(("stated", "lighter", "heavier"), [(1.1, "target", "impactor"), (0.9, "impactor", "target")])
+def test_of_two_masses_only_the_ratio_shows_and_what_was_left_out_leads(stated, lighter, heavier):
+    found = told(model(target=stated * TARGET), spring)
+    first, second = found.ranking[:2]
+    assert found.verdict == "effect_missing" and found.complete
+    assert first.name == f"added_mass on {heavier}" and first.coefficient > 0.0
+    assert second.name == f"added_mass on {lighter}" and second.coefficient < 0.0
+    assert second.name in first.confounded_with
+
+
+def test_channels_that_are_all_late_are_an_early_time_zero():
+    """A half sine rises gently: 1 ms later it is not seen to begin elsewhere, and two delays of 1 ms were told."""
+    found = told(model(), spring, late=1e-3, noise=0.01)
+    assert [step.effect for step in found.steps] == ["time_zero"], found.text
+    assert abs(found.steps[0].coefficient - 1e-3) < 5e-5
