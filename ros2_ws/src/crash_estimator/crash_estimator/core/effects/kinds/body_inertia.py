@@ -19,10 +19,6 @@ LEFT_OUT = 3.0
 ratio of the masses shows, and what was left out of a model is far commoner than what was counted twice. Ours, not
 varied."""
 
-LIGHTEST = 0.3
-"""Share of its mass by which a body may be lighter than stated: a tank taken as full, a dummy left out, is less. Ours,
-not varied; without a limit a fit may try a body without mass."""
-
 
 @dataclass(frozen=True)
 class BodyInertia(Effect):
@@ -39,7 +35,7 @@ class BodyInertia(Effect):
         if spec.coefficient is not None:
             return heavier(structure, k, spec.coefficient)
         mass = structure.bodies[k].mass
-        coefficient = replace(coefficient_of(spec, self), min=-LIGHTEST * mass)
+        coefficient = replace(coefficient_of(spec, self), min=-ROUGHLY * mass)
         return with_action(structure, spec, self.unit, "mass", k, coefficient, ROUGHLY * mass)
 
     def mass_shares(self, addition):
@@ -52,7 +48,8 @@ class BodyInertia(Effect):
         return ROUGHLY * self._mass(magnitudes.structure, addition)
 
     def limits(self, magnitudes, addition):
-        return -LIGHTEST * self._mass(magnitudes.structure, addition), self.high
+        """A body that would be lighter by more than effects make up is another body, or none."""
+        return -ROUGHLY * self._mass(magnitudes.structure, addition), self.high
 
     def log_prior_odds_against(self, structure, c):
         free = [body for body in structure.bodies if body.free]
