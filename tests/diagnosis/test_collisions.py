@@ -2,6 +2,7 @@
 simulators of the project do not draw."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -52,6 +53,12 @@ def collision(force: Callable, speed: float, rate: float, late: float = 0.0, noi
     channels = tuple(Channel(f"{body}_ax", "acceleration", body, "x") for body in ("impactor", "target"))
     test = Test(f"{speed:g} m/s", channels, initial_velocity={"impactor": speed})
     return Recording(test, np.rint(n * 1e9 / rate).astype(np.int64), values)
+
+
+def misstated(recording: Recording, share: float) -> Recording:
+    """The same, of which the test says another speed."""
+    speeds = {body: (1.0 + share) * speed for body, speed in recording.test.initial_velocity.items()}
+    return replace(recording, test=replace(recording.test, initial_velocity=speeds))
 
 
 def told(structure: Structure, force: Callable, rate: float = 1e4, **more) -> Diagnosis:
@@ -107,3 +114,21 @@ def test_channels_that_are_all_late_are_an_early_time_zero():
     found = told(model(), spring, late=1e-3, noise=0.01)
     assert [step.effect for step in found.steps] == ["time_zero"], found.text
     assert abs(found.steps[0].coefficient - 1e-3) < 5e-5
+
+
+@pytest.mark.parametrize("wrong", [0, 1])
+def test_a_speed_that_is_stated_wrongly_of_one_test_is_told_of_that_one(wrong):
+    """One share for both tests does not mend it: hysteresis was told, or an unloading line as steep as the spring."""
+    recordings = [collision(spring, speed, 1e4) for speed in SPEEDS]
+    recordings[wrong] = misstated(recordings[wrong], 0.05)
+    found = diagnose(model(), recordings)
+    (step,) = found.steps
+    assert (found.verdict, found.complete, step.recording) == ("effect_missing", True, recordings[wrong].test.id)
+    assert step.name == f"initial_velocity on impactor in {step.recording}" and step.name in found.text
+    assert abs(1.05 * (1.0 + step.coefficient) - 1.0) < 4.0 * step.std
+    assert found.effects_added == () == found.structure.effects, "it is the recording's own"
+
+
+def test_one_of_all_tests_is_told_of_all():
+    found = diagnose(model(), [misstated(collision(spring, speed, 1e4), 0.05) for speed in SPEEDS])
+    assert [(step.effect, step.recording) for step in found.steps] == [("initial_velocity", "")], found.text

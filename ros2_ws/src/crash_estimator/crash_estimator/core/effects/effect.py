@@ -241,6 +241,7 @@ class Addition:
     touches: str | None = None  # unmodelled_body: the body that it pushes by a free curve
     taken_from: str | None = None  # unmodelled_body: the free body whose mass it was counted in
     variant: str = ""  # one of the effect's `variants`
+    recording: str = ""  # identifier of the one test that it acts in; "": in all
 
     @property
     def key(self) -> tuple[str, str]:

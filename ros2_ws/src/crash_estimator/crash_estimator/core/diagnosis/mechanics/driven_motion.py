@@ -109,9 +109,10 @@ def start_values(experiment: Experiment, theta: np.ndarray) -> tuple[np.ndarray,
 
 def start_by(experiment: Experiment) -> list[tuple[int, np.ndarray]]:
     """Derivatives of the initial velocities: (parameter, (b,))."""
-    layout, _, _ = experiment
+    layout, record, _ = experiment
     index, found = layout.structure.body_index, []
-    for term in (term for term in layout.terms if term.addition.effect.changes_start):
+    here = (term for term in layout.terms if term.addition.recording in ("", record.test.id))
+    for term in (term for term in here if term.addition.effect.changes_start):
         faster = term.addition.effect.start_velocity(term.addition.target, index, stated_start(experiment)[0])
         found.append((term.coefficient, faster))
     return found

@@ -68,8 +68,8 @@ class Diagnosis:
 
     @property
     def effects_added(self) -> tuple[StepReport, ...]:
-        """The steps that the structure has: a time zero is the recordings' own."""
-        return tuple(step for step in self.steps if step.effect != TIME_ZERO)
+        """The steps that the structure has: a time zero, and what is wrong in one recording, are the recordings'."""
+        return tuple(step for step in self.steps if step.effect != TIME_ZERO and not step.recording)
 
     def as_json(self) -> dict:
         return {

@@ -37,6 +37,7 @@ class Ranked:
     shape: dict[str, float] = field(default_factory=dict)  # shape constants found
     fitted: bool = True  # False: screened only; its evidence is an estimate
     form: str = ""  # in which the effect is written, of those that it has; "": the usual one
+    recording: str = ""  # identifier of the one test that it acts in; "": in all
 
     @property
     def name(self) -> str:
@@ -62,11 +63,12 @@ class StepReport:
     free_run_rms: dict
     force_explained: dict[str, dict]  # per measured force: share explained by the inertias, before and after
     form: str = ""  # as of a `Ranked`
+    recording: str = ""  # likewise
 
     @property
     def name(self) -> str:
         form = f" ({self.form})" if self.form else ""
-        return f"{self.effect}{form} on {self.target}"
+        return f"{self.effect}{form} on {self.target}" + (f" in {self.recording}" if self.recording else "")
 
     def as_json(self) -> dict:
         return vars(self)
@@ -127,7 +129,7 @@ def _ranked(one: CandidateFit, before: Model, shown: list[CandidateFit]) -> Rank
     identifiable = not rivals and bool(std <= abs(value))  # whose sigma exceeds it may as well be nothing
     return Ranked(
         effect, target, value, std, addition.effect.unit, float(one.gain), explained, identifiable, rivals, shape,
-        one.fit is not None, addition.variant,
+        one.fit is not None, addition.variant, addition.recording,
     )  # fmt: skip
 
 
@@ -156,6 +158,7 @@ def step_of(
         free_run_rms={"before": free_run_rms[0], "after": free_run_rms[1]},
         force_explained=_force_explained(step.before.fit, changed),
         form=best.addition.variant,
+        recording=best.addition.recording,
     )  # fmt: skip
 
 

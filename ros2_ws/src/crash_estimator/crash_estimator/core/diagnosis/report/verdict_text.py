@@ -36,6 +36,8 @@ def verdict_text(
         said += f"; what rings above {below:g} Hz, {vibration_of(final) / G:.3g} g, is left out"
     masses = _masses_otherwise(final) if evidence.noise else []
     said = "; with ".join([said, *_contacts_otherwise(structure, final.fit.layout.structure), *masses])
+    if any(step.recording for step in steps):
+        said += "; what is wrong in one recording is mended in its description, not in the model"
     if steps and steps[0].effect == TIME_ZERO:
         moved = steps[0].shape or {steps[0].target: steps[0].coefficient}
         said += f"; {signals_begin(moved)}: `import --time-zero S` moves it, by so many s"

@@ -131,7 +131,7 @@ class _Search:
     def other_variants(self) -> None:
         """Fit the best ones in the other ways in which they may act on their targets."""
         best = {one.addition.key for one in self._best()}
-        ways = [one for one in self.screened if len(one.addition.effect.variants) > 1]
+        ways = [one for one in self.screened if len(one.addition.effect.variants) > 1 or one.addition.recording]
         self.from_motion(one for one in ways if one.addition.key in best)
 
     def _extended(self, addition: Addition) -> None:

@@ -16,7 +16,10 @@ AS_FAST = 1e-6
 
 @dataclass(frozen=True)
 class BodyStart(Effect):
-    """A body's velocity at time zero, and that of all that start as fast as it does: v0 = (1 + c) stated."""
+    """A body's velocity at time zero, and that of all that start as fast as it does: v0 = (1 + c) stated.
+
+    Found in one test alone it belongs to that recording, not to the model.
+    """
 
     acts_on: ClassVar[str] = "body"
     changes_start: ClassVar[bool] = True
@@ -39,11 +42,13 @@ class BodyStart(Effect):
         return np.where(np.abs(velocity - own) <= AS_FAST * abs(own), velocity, 0.0)
 
     def candidates(self, structure, magnitudes) -> Iterator[Addition]:
-        """One for each velocity, where nothing else is derived from how a body moves."""
+        """For each velocity, where nothing else is derived from how a body moves: in all tests alike, or in one."""
+        tests = [record.test.id for record in magnitudes.records]
+        ways = ["", *tests] if len(set(tests)) == len(tests) > 1 else [""]
         seen = np.zeros(len(structure.bodies), bool)
         for k, name in enumerate(structure.body_index):
             group = self.start_velocity(name, structure.body_index, magnitudes.records[0].initial_velocity) != 0.0
             observed = any(structure.bodies[j].starts_as_observed for j in np.flatnonzero(group))
             if group[k] and not seen[k] and not observed:
-                yield Addition(self, name)
+                yield from (Addition(self, name, recording=test) for test in ways)
             seen |= group
