@@ -94,7 +94,7 @@ class _Search:
         asked: Callable | None = None
         of: SelectionPath | None = None
         for look in (self._at_onsets, self._sharper, self._sharper_by_other_laws, self._sharper_by_other_laws):
-            if search_is_over() or _left_by(path).mean_square >= THRESHOLDS.real_structure:
+            if search_is_over() or (look != self._at_onsets and _leaves_far_more(path)):
                 break
             there = () if asked == look and of is path else look(path, begins, shifts, most)
             asked, of = look, path
@@ -115,15 +115,17 @@ class _Search:
     def _at_onsets(
         self, path: SelectionPath, begins: tuple[Shift, ...], taken: tuple[Shift, ...], most: int
     ) -> tuple[Shift, ...]:
-        """The onsets, where some are not where they were taken to be, and what was found leaves less from there on."""
+        """The onsets, where some are not where they were taken to be, and what was found leaves less from there on; of
+        so much more than noise that a real structure may leave it, next to none of it."""
         pairs = zip(begins, taken, strict=True)
         elsewhere = any(onset.differs and abs(onset.seconds - one.seconds) > onset.period for onset, one in pairs)
         if path.noise or not elsewhere:
             return ()
         records = self._observed(begins)
         magnitudes = measure_magnitudes(path.structure, records, CELLS)
-        there = fit_model(magnitudes, records, path.final.additions)
-        return begins if there.residuals.mean_square < _left_by(path).mean_square else ()
+        there = fit_model(magnitudes, records, path.final.additions).residuals
+        least = THRESHOLDS.all_but_folds if _leaves_far_more(path) else 0.0
+        return begins if share_removed(_left_by(path), there) > least else ()
 
     def _sharper(
         self, path: SelectionPath, begins: tuple[Shift, ...], taken: tuple[Shift, ...], most: int,
@@ -193,6 +195,11 @@ class _Search:
 def _left_by(path: SelectionPath) -> Residuals:
     """In the sensors' noise."""
     return analyse(path.as_recorded)
+
+
+def _leaves_far_more(path: SelectionPath) -> bool:
+    """Than noise, as a real structure may of any lumped model."""
+    return _left_by(path).mean_square >= THRESHOLDS.real_structure
 
 
 def _much_better(path: SelectionPath, others: Sequence[Begun]) -> Begun | None:
