@@ -23,7 +23,7 @@ def test_the_answer_is_the_same_though_the_diagnosis_was_stopped(demo):  # noqa:
     assert show.end() == 0, show.said()
     answer = answer_in(show.said())
     assert len(answer) == 6, show.said()
-    assert "what it lacks: coulomb_friction on rib_spine, 1413 ± 6 N; evidence 23307 nats, explains 94%" in answer
+    assert "what it lacks: coulomb_friction on rib_spine, 1413 ± 6 N; evidence 23162 nats, explains 94%" in answer
     added = "revision 1: dummy with coulomb_friction on rib_spine; 1401 samples estimated again"
     assert f"added to hidden_effect: {added}" in answer
 
