@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 from crash_estimator.core.diagnosis import Diagnosis, diagnose
 from crash_estimator.core.structure import Structure
+from crash_estimator.diagnosis_tables import ranking_table, revisions_table, steps_table
 from crash_estimator.model_file import ModelFile
 from crash_replay.recording import Channel, Recording, Test
 
@@ -129,6 +130,9 @@ def test_a_speed_that_is_stated_wrongly_of_one_test_is_told_of_that_one(wrong):
     assert step.name == f"initial_velocity on impactor in {step.recording}" and step.name in found.text
     assert abs(1.05 * (1.0 + step.coefficient) - 1.0) < 4.0 * step.std
     assert found.effects_added == () == found.structure.effects, "it is the recording's own"
+    assert found.as_json()["steps"][0]["recording"] == step.recording
+    for table in (steps_table(found), ranking_table(found.ranking), revisions_table(found)):
+        assert step.name in table
 
 
 def test_one_of_all_tests_is_told_of_all():

@@ -279,7 +279,7 @@ def test_what_the_model_has_is_common_in_all_its_forms():
     specs = EffectSpec("maxwell_element", target), EffectSpec("rate_hardening", target, variant="logarithmic")
     found = common_effects(replace(model, effects=specs), EFFECTS)
     assert EFFECTS.keys() - found.keys() == RARE - {"maxwell_element"}
-    assert found["rate_hardening"].variants == EFFECTS["rate_hardening"].variants
+    assert found["rate_hardening"].variants == ("", "logarithmic", "uneven", "uneven_logarithmic")
 
 
 def test_what_was_found_in_the_whole_band_is_common_in_a_part_of_it():

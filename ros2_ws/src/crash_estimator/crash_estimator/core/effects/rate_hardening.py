@@ -65,3 +65,5 @@ EFFECT = StaticFactor(
         "uneven_logarithmic": ("reference_rate", "rebound"),
     },
 )
+"""Limits of the rebound: a fifth is next to nothing beside the usual form, of loading only; five as of a damper's. Ours,
+not varied: laws in |V|, which it is for, were found with 1.00."""

@@ -12,8 +12,9 @@ what was left moved a padding that springs back at 400 to 700 kN/m in six of 13 
 second effect was told for it; with 12 in none."""
 
 ATTACHED_MODES = 6
-"""The same of an attached body, which pushes by its inertia: no stiff spring feels where it is. Of NHTSA 10146, which
-rings, what is named first hangs on this number as on any rounding: with 7 to 12 the engine, or the car's unloading."""
+"""The same of an attached body, which mostly pushes by its inertia alone: no stiff spring feels where it is. Of NHTSA
+10146, which rings, what is named first hangs on this number by chance, as on any rounding: with 7 to 12 the engine, or
+the car's unloading. It is what was tried first."""
 
 
 def grid_of(sample_time: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:

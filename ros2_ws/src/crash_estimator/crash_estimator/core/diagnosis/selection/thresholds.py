@@ -73,8 +73,8 @@ class Thresholds(NamedTuple):
     and more in six, in the others 0.937 and 0.948. `yielding` followed 0.36 to 0.88 of seven looked-at elements that
     break or fold, a stop 0.82 to 0.85 of two that fold; of 12 stops told rightly in another form 10 explained 0.99 and
     more, the others 0.78 and 0.85. Of 24 recordings of a real impactor that yields `yielding` explained 0.95 and more,
-    with a delay or not, in 19. And share by which a model must leave less from its onset on where
-    it leaves far more than noise: of four looked-at tests 3 to 8 ms late all did by 0.99 and more."""
+    with a delay or not, in 19. And share by which a model must leave less from its onset on where it leaves far more
+    than noise: of four looked-at tests 3 to 8 ms late all did by 0.99 and more."""
 
     # What is said, of what leaves more than noise
     most_at_once: int = 2
