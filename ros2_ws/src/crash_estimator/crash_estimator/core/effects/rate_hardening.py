@@ -65,5 +65,5 @@ EFFECT = StaticFactor(
         "uneven_logarithmic": ("reference_rate", "rebound"),
     },
 )
-"""Limits of the rebound: a fifth is next to nothing beside the usual form, of loading only; five as of a damper's. Ours,
-not varied: laws in |V|, which it is for, were found with 1.00."""
+"""Limits of the rebound: a fifth is next to nothing beside the usual form, of loading only; five, as of a damper's. Not
+varied: laws in |V|, which it is for, were found with 1.00."""
