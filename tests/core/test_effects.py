@@ -20,7 +20,7 @@ from crash_estimator.core.structure_parts import ALL, NOTHING, SPRINGS, Action
 from crash_estimator.model_file import load_model
 
 VOCABULARY = """viscous_damping quadratic_damping coulomb_friction hysteresis maxwell_element gas_cushion
-rate_hardening cubic_stiffness clearance bottoming_out yielding plastic_unloading load_path added_mass
+rate_hardening added_stiffness cubic_stiffness clearance bottoming_out yielding plastic_unloading load_path added_mass
 unmodelled_body constant_force guide_friction initial_velocity channel_delay channel_gain channel_offset
 force_offset""".split()
 DAMPERS = ("viscous_damping", "quadratic_damping", "coulomb_friction")
@@ -112,9 +112,10 @@ def test_the_logarithmic_rate_doubles_the_force_too_and_counts_from_its_referenc
 
 
 def test_the_limits_are_physical():
-    """Damping and stiffness never negative; a delay within 1 ms, gains and stated speeds within 10 %, offsets 5 g; a
-    body may be heavier than stated, or lighter."""
-    signed = {"added_mass", "constant_force", "initial_velocity", "channel_gain", "channel_offset", "force_offset"}
+    """Damping and a spring beside never negative; a delay within 1 ms, gains and stated speeds within 10 %, offsets
+    5 g; a body may be heavier than stated, or lighter, and a stated spring stiffer, or softer."""
+    stated = {"added_mass", "added_stiffness", "constant_force", "initial_velocity"}
+    signed = stated | {"channel_gain", "channel_offset", "force_offset"}
     assert {name for name, effect in EFFECTS.items() if effect.low < 0.0} == signed
     assert EFFECTS["channel_delay"].high == pytest.approx(1e-3)
     assert (EFFECTS["channel_gain"].low, EFFECTS["channel_gain"].high) == pytest.approx((-0.1, 0.1))

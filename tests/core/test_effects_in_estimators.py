@@ -19,6 +19,7 @@ from crash_estimator.core.free_run import free_run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.core.structure import Body, Coefficient, EffectSpec, ModelError
 from crash_replay.recording import Recording
+from crash_replay.synthetic.hidden.vocabulary import VOCABULARY
 
 IN_DUMMY = ("viscous_damping", "quadratic_damping", "coulomb_friction", "load_path")
 IN_FRONTAL = ("added_mass", "unmodelled_body", "constant_force", "channel_gain", "channel_offset")
@@ -43,7 +44,7 @@ def free_run_misfit(structure, recording: Recording) -> np.ndarray:
     return np.sqrt(np.nanmean((simulated.predicted - simulated.measured) ** 2, axis=0)) / sensor
 
 
-@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("effect", VOCABULARY)
 def test_with_the_known_effect_the_free_run_s_error_falls(effect):
     place = place_of(effect)
     model, what, recording, _ = hidden(effect, place)
@@ -99,6 +100,14 @@ def test_beside_a_constant_spring_every_force_is_recovered(effect, noise):
         value, std, _ = found[name]
         # without noise: up to the prior, and to the zero offset of 50 samples
         assert abs(value - truth) < (3.0 * std if noise else 1e-4 * truth), (name, value, truth, std)
+
+
+@pytest.mark.parametrize("stated", [1.4e4, 2.6e4])
+def test_by_how_much_a_stated_stiffness_is_off_is_estimated(stated):
+    model = add_effect(oscillator(Coefficient(stated)), "added_stiffness", "spring")
+    value, std, status = last_of(model, oscillator_recording(damping=0.0, noise=1.0))["spring.added_stiffness"]
+    assert status != ParameterStatus.KNOWN and std < 300.0
+    assert abs(value - (2.0e4 - stated)) < 3.0 * std
 
 
 def test_rate_hardening_is_recovered_as_c_of_one_plus_c_h():

@@ -18,9 +18,10 @@ from crash_estimator.core.structure import ModelError
 from crash_estimator.model_file import load_model
 from crash_replay.bag import write_bag
 from crash_replay.synthetic.hidden.cases import draw_case
+from crash_replay.synthetic.hidden.vocabulary import VOCABULARY
 
 
-@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("effect", VOCABULARY)
 def test_added_and_removed_it_is_the_model_as_before(effect):
     place = place_of(effect)
     model, what, recording, more = hidden(effect, place)
@@ -90,7 +91,7 @@ def command(monkeypatch, module, *arguments) -> int:
     return exit_.value.code
 
 
-@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("effect", VOCABULARY)
 def test_what_a_diagnosis_writes_is_estimated(monkeypatch, capsys, folder, effect):
     place = place_of(effect)
     _, what, recording, _ = hidden(effect, place)

@@ -82,7 +82,7 @@ def test_slow_noise_that_one_rest_cannot_tell_is_told_by_several_of_any_strength
     for _ in range(TIMES):
         rests = [behind_a_pole(170.0)(size * rng.standard_normal(3 * REST))[REST : 2 * REST] for size in (1, 2, 5, 1)]
         alone.append(noise_spectrum(rests[1], PERIOD))
-        together.append(noise_spectrum(rests[1], PERIOD, [colour_of(rests)]))
+        together.append(noise_spectrum(rests[1], PERIOD, [colour_of(rests, PERIOD)]))
     assert sum(one.white for one in alone) > 0.5 * TIMES and not any(one.white for one in together)
     slow = np.array([0.0])
     zero = [one.std * float(np.sqrt(one.density(slow)[0])) for one in together]
@@ -96,10 +96,10 @@ def test_a_sensor_of_another_colour_keeps_its_own():
     rng = np.random.default_rng(5)
     coloured = [behind_a_pole(300.0)(rng.standard_normal(3 * REST))[REST : 2 * REST] for _ in range(5)]
     white = rng.standard_normal(REST)
-    alike = [colour_of([*coloured, white])]
+    alike = [colour_of([*coloured, white], PERIOD)]
     assert noise_spectrum(white, PERIOD, alike).white
     assert noise_spectrum(white, PERIOD, alike) == noise_spectrum(white, PERIOD)
-    assert not noise_spectrum(coloured[0], PERIOD, [colour_of(coloured)]).white
+    assert not noise_spectrum(coloured[0], PERIOD, [colour_of(coloured, PERIOD)]).white
 
 
 def test_several_sensors_on_bodies_that_sway_say_no_more_than_one():
@@ -107,12 +107,12 @@ def test_several_sensors_on_bodies_that_sway_say_no_more_than_one():
     rng, time = np.random.default_rng(0), PERIOD * np.arange(250)
     phases = rng.uniform(0.0, 2.0 * np.pi, 8)
     rests = [rng.standard_normal(len(time)) + 3.0 * np.sin(2.0 * np.pi * 10.0 * time + phase) for phase in phases]
-    found, alike = colour_of(rests), [colour_of(rests)]
+    found, alike = colour_of(rests, PERIOD), [colour_of(rests, PERIOD)]
     assert len(found.coefficients) and found.known(len(time), found.samples) > TOLD
     assert all(noise_spectrum(rest, PERIOD, alike).white for rest in rests)
 
 
 def test_sensors_without_noise_have_no_colour():
-    assert noise_spectrum(np.full(REST, 3.0), PERIOD, [colour_of([np.full(REST, 3.0)] * 2)]) == NoiseSpectrum(
+    assert noise_spectrum(np.full(REST, 3.0), PERIOD, [colour_of([np.full(REST, 3.0)] * 2, PERIOD)]) == NoiseSpectrum(
         0.0, REST, period=PERIOD
     )

@@ -89,6 +89,7 @@ def recording() -> Recording:
 EVERY_EFFECT = (
     EffectSpec("viscous_damping", "foam", 200.0),
     EffectSpec("viscous_damping", "foam", 200.0, {"rebound": 0.3}, variant="uneven"),
+    EffectSpec("viscous_damping", "foam", 200.0, {"exponent": 1.5}, variant="hunt_crossley"),
     EffectSpec("quadratic_damping", "foam", 60.0),
     EffectSpec("quadratic_damping", "foam", 60.0, {"rebound": 0.3}, variant="uneven"),
     EffectSpec("coulomb_friction", "mount", 400.0, {"speed": 0.3}),
@@ -100,6 +101,7 @@ EVERY_EFFECT = (
     EffectSpec("rate_hardening", "foam", 40.0, {"reference_rate": 0.5}, variant="logarithmic"),
     EffectSpec("rate_hardening", "foam", 40.0, {"exponent": 2.0, "rebound": 0.6}, variant="uneven"),
     EffectSpec("rate_hardening", "foam", 40.0, {"reference_rate": 0.05, "rebound": 0.6}, variant="uneven_logarithmic"),
+    EffectSpec("added_stiffness", "foam", 2.0e4),
     EffectSpec("cubic_stiffness", "foam", 2.0e6),
     EffectSpec("clearance", "foam", 0.02),
     EffectSpec("clearance", "mount", 0.005, variant="play"),

@@ -230,7 +230,9 @@ def test_beside_a_rare_effect_nothing_else_is_taken_on_the_same_element():
 def test_of_an_effect_in_several_forms_those_that_are_not_looked_for_first_are_rare():
     damper, gas, gap = (EFFECTS[name] for name in ("viscous_damping", "gas_cushion", "clearance"))
     rest = damper.without(damper.common())
-    assert (rest.variants, rest.rare) == (("uneven",), True) and is_rare(Addition(rest, "mount", variant="uneven"))
+    assert (rest.variants, rest.rare) == (("uneven", "hunt_crossley"), True) and is_rare(
+        Addition(rest, "mount", variant="uneven")
+    )
     assert gas.without(gas.common()) is gas and gap.without(gap.common()) is None
     assert damper.without(damper) is None, "where the model has one, all its forms are common"
 

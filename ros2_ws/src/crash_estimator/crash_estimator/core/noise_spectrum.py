@@ -58,10 +58,6 @@ CORNER = 2.0775
 TEN_DOWN = 1.21
 """Times f0: where G^2 is 10 dB down."""
 
-ALIKE = 0.4
-"""Natural logarithm of the ratio to a class's own f0 within which it is that class: classes are a factor of 1.7 apart
-at least, and 30 ms of noise tell f0 to a fifth."""
-
 PASSED = 0.5
 """Of f0: the band in which a filtered channel is compared, and in which what the filter took, 6 %, is given back."""
 
@@ -84,6 +80,10 @@ class NoiseSpectrum(NamedTuple):
         """Standard deviation."""
         frequency = np.linspace(0.0, 0.5 / self.period, FINE)
         return self.std * float(np.sqrt((self.density(frequency) * _gain(frequency / self.corner) ** 2).mean()))
+
+    @property
+    def seen_early(self) -> float:
+        return seen_early(self.corner)
 
     @property
     def passed(self) -> float:
@@ -115,6 +115,7 @@ class Colour(NamedTuple):
     coefficients: np.ndarray  # a_k; none: white
     samples: int  # that they were found from
     spread: float  # s^2 1' R^-1 1 / (1 + sum a)^2, R the autocovariance of n(t)
+    corner: float = np.inf  # f0, Hz, of the filter that has cut it off; inf: none has
 
     def left(self, values: np.ndarray) -> float:
         """Variance of e in values (n,), forward and backward."""
@@ -128,7 +129,7 @@ class Colour(NamedTuple):
         return max(1.0 / (1.0 / n + 2.0 * self.spread / samples), 2.0)
 
 
-def colour_of(rests: Sequence[np.ndarray]) -> Colour:
+def colour_of(rests: Sequence[np.ndarray], period: float) -> Colour:
     """Of noises alone, values (n,) each, that are as loud as they like."""
     rests = [(rest - rest.mean()) / (np.std(rest) or 1.0) for rest in rests]
     n = sum(len(rest) for rest in rests)
@@ -138,7 +139,7 @@ def colour_of(rests: Sequence[np.ndarray]) -> Colour:
     if order == 0 or chdtrc(order, gained[order]) > SIGNIFICANT:
         return Colour(np.zeros(0), n, 0.0)
     a = filters[order]
-    return Colour(a, n, _spread(a, variances[order], rests))
+    return Colour(a, n, _spread(a, variances[order], rests), _corner(a, rests, period))
 
 
 def noise_spectrum(values: np.ndarray, period: float, alike: Sequence[Colour] = ()) -> NoiseSpectrum:
@@ -146,14 +147,13 @@ def noise_spectrum(values: np.ndarray, period: float, alike: Sequence[Colour] = 
     leaves no more of it than its own does, but by chance."""
     n, values = len(values), values - values.mean()
     white = NoiseSpectrum(float(np.std(values, ddof=1)), float(n), period=period)
-    own = colour_of([values])
+    own = colour_of([values], period)
     colour = next((one for one in alike if _explains(one, own, values)), own)
     a, order = colour.coefficients, len(colour.coefficients)
     if not order:
         return white
-    corner = _corner(a, period)
-    if corner < np.inf:
-        return _before_the_filter(values, corner, period)
+    if colour.corner < np.inf:
+        return _before_the_filter(values, colour.corner, period)
     worth = colour.known(n, colour.samples)
     if worth < TOLD or colour.known(n, n) < ALONE:
         return white
@@ -168,6 +168,12 @@ def _explains(colour: Colour, own: Colour, values: np.ndarray) -> bool:
     return bool(chdtrc(order, max(lost, 0.0)) > SIGNIFICANT)
 
 
+def seen_early(corner: float) -> float:
+    """s by which a filter that runs backward, too, shows a motion before it begins: half a period of the highest
+    frequency that it passes."""
+    return 0.5 / (PASSED * corner)
+
+
 def _before_the_filter(values: np.ndarray, corner: float, period: float) -> NoiseSpectrum:
     frequency = np.arange(len(values)) / (2.0 * len(values) * period)
     inside = (frequency > 0.0) & (frequency < corner)
@@ -175,15 +181,29 @@ def _before_the_filter(values: np.ndarray, corner: float, period: float) -> Nois
     return NoiseSpectrum(float(np.sqrt(power.mean())), float(len(power)), corner=corner, period=period)
 
 
-def _corner(a: np.ndarray, period: float) -> float:
+def _corner(a: np.ndarray, rests: Sequence[np.ndarray], period: float) -> float:
+    """f0 of a class, or, where the noise up to 20 dB down tells it from all of these, as it is 10 dB down."""
     frequency = np.linspace(0.0, 0.5 / period, FINE)
     density = _density(a, frequency, period) / _slow_density(a, period)
     ten, twenty = (_first(frequency, density < down) for down in (0.1, 0.01))
     if not twenty < STEEP * ten:
         return np.inf
-    found = ten / TEN_DOWN
-    nearest = min((CORNER * cfc for cfc in CFC_CLASSES), key=lambda f0: abs(np.log(f0 / found)))
-    return nearest if abs(np.log(nearest / found)) < ALIKE else found
+    of_classes, own = [CORNER * cfc for cfc in CFC_CLASSES], ten / TEN_DOWN
+    likelihoods = [_likelihood(rests, corner, twenty, period) for corner in (*of_classes, own)]
+    likelihoods[-1] -= 0.5 * np.log(sum(len(rest) for rest in rests))  # it was found from them (BIC)
+    return float((*of_classes, own)[np.argmax(likelihoods)])
+
+
+def _likelihood(rests: Sequence[np.ndarray], corner: float, below: float, period: float) -> float:
+    """Logarithm, less a constant, of what of noises (n,) is below so many Hz, white before a filter (Whittle 1953)."""
+    found = 0.0
+    for rest in rests:
+        frequency = np.arange(1, len(rest)) / (2.0 * len(rest) * period)
+        shape = _gain(frequency[frequency < below] / corner) ** 2
+        if len(shape):  # a rest may be shorter than half a period of what is below
+            power = dct(rest, norm="ortho")[1 : 1 + len(shape)] ** 2 / shape
+            found -= 0.5 * (len(shape) * np.log(power.mean()) + np.log(shape).sum())
+    return found
 
 
 def _gain(of_corner: np.ndarray) -> np.ndarray:

@@ -128,6 +128,16 @@ class Dashpot(Branch):
 
 
 @dataclass(frozen=True)
+class DeepeningDashpot(Branch):
+    """F = b x v: what touches presses on a larger surface the deeper it is (Hunt and Crossley 1975)."""
+
+    b: float
+
+    def force(self, x: float, v: float, z: Z, mode: int) -> float:
+        return self.b * x * v
+
+
+@dataclass(frozen=True)
 class Orifice(Turning):
     """F = q v |v|: a fluid pressed through a hole (Bernoulli)."""
 

@@ -111,6 +111,11 @@ FORMS: dict[str, Form] = {
     "damper.contact": Form(
         "viscous_damping", CONTACTS, sizes.beside(lambda b: branches.Dashpot(b.share(0.2, 0.4) * b.peak.f / b.peak.v))
     ),
+    "damper.deepening": Form(
+        "viscous_damping",
+        CONTACTS,
+        sizes.beside(lambda b: branches.DeepeningDashpot(b.share(0.5, 0.9) * b.peak.f / (b.peak.x * b.peak.v))),
+    ),
     "damper.quadratic": Form(
         "quadratic_damping",
         ELEMENTS,

@@ -2,6 +2,7 @@
 
 from . import (
     added_mass,
+    added_stiffness,
     bottoming_out,
     channel_delay,
     channel_gain,
@@ -34,6 +35,7 @@ _FILES = (
     maxwell_element,
     gas_cushion,
     rate_hardening,
+    added_stiffness,
     cubic_stiffness,
     clearance,
     bottoming_out,

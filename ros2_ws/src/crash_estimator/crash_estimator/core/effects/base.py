@@ -15,11 +15,12 @@ from .kinds import (
     Gap,
     GuideForce,
     PairSpring,
+    StatedSpring,
     StaticFactor,
     UnloadingSlope,
 )
 
 __all__ = [
     "Addition", "AttachedBody", "BodyForce", "BodyInertia", "BodyStart", "ChannelError", "Effect", "ElementForce",
-    "ElementMotion", "Gap", "GuideForce", "PairSpring", "Shape", "StaticFactor", "UnloadingSlope",
+    "ElementMotion", "Gap", "GuideForce", "PairSpring", "Shape", "StatedSpring", "StaticFactor", "UnloadingSlope",
 ]  # fmt: skip

@@ -25,7 +25,10 @@ SMALLEST_OPENING = 0.01
 EFFECT = ElementForce(
     "quadratic_damping",
     "N*s^2/m^2",
-    {"stroke": Shape("m", 1.05, 5.0, (1.3, 2.5), of_crush=True), **viscous_damping.EFFECT.shapes},
+    {
+        "stroke": Shape("m", 1.05, 5.0, (1.3, 2.5), of_crush=True),
+        "rebound": viscous_damping.EFFECT.shapes["rebound"],
+    },
     force=force,
     forms={"": (), "metered": ("stroke",), "uneven": ("rebound",)},
 )

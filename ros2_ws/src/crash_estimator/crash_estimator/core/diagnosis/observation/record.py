@@ -121,8 +121,7 @@ class ObservedRecord(NamedTuple):
 
     @property
     def seen_early(self) -> float:
-        """s by which a filter that runs backward, too, shows a motion before it begins: half a period of the highest
-        frequency that it passes."""
+        """s by which a filter that runs backward, too, may show a motion before it begins."""
         return _seen_early(self.spectra)
 
     @property
@@ -270,7 +269,7 @@ def _from_rest(crush: Signal, tension: bool, rest_ends: int) -> Signal:
 
 
 def _seen_early(spectra: Sequence[NoiseSpectrum]) -> float:
-    return 0.5 / min((spectrum.passed for spectrum in spectra), default=np.inf)
+    return max((spectrum.seen_early for spectrum in spectra), default=0.0)
 
 
 def _offset_std(signal: Signal, output: Output) -> float:

@@ -1,20 +1,25 @@
 """What a system's recordings say, before the impact, of their sensors' noise: all that are alike, together.
 
 What is slow shows but a few times in some tens of milliseconds at rest: the same sensor in other recordings, and others
-of the same kind, tell more of the noise's colour.
+of the same kind, tell more of the noise's colour. A filter that runs backward, too, shows the motion before it begins:
+where that hides the filter, the end of what is said to rest is left out.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from crash_replay.conditioning import RESTS_AT_ZERO
+from crash_replay.conditioning import CFC_CLASSES, RESTS_AT_ZERO
 from crash_replay.onset import find_onset
 from crash_replay.recording import Recording
 
-from ...noise_spectrum import Colour, colour_of
+from ...noise_spectrum import CORNER, Colour, colour_of, seen_early
 from ...sensor_noise import ENOUGH
+
+EARLIEST = seen_early(CORNER * min(CFC_CLASSES))
+"""s before the impact in which any filter of SAE J211-1 may show what moves: they do not tell the noise's colour."""
 
 
 class Quiet(NamedTuple):
@@ -23,6 +28,14 @@ class Quiet(NamedTuple):
     ends: int  # ns
     period: int  # us, between samples
     values: Mapping[tuple[str, str], np.ndarray]  # by quantity and channel, of those that rest; empty where too few
+
+    def without_the_last(self, seconds: float) -> "Quiet":
+        """As it is where too little would be left."""
+        samples = math.ceil(seconds * 1e6 / self.period)
+        if samples == 0 or not self.values or any(len(rest) < samples + ENOUGH for rest in self.values.values()):
+            return self
+        values = {key: rest[:-samples] for key, rest in self.values.items()}
+        return Quiet(self.ends - samples * self.period * 1000, self.period, values)
 
 
 class Rest(NamedTuple):
@@ -44,19 +57,32 @@ def quiet_of(recording: Recording) -> Quiet:
         for channel in rests
         if np.count_nonzero(quiet) >= ENOUGH and np.isfinite(recording.column(channel.name)).any()
     }
-    return Quiet(end, round(recording.sample_period * 1e6), values)
+    return Quiet(end, max(round(recording.sample_period * 1e6), 1), values)
 
 
 def rest_of(one: Quiet, others: Sequence[Quiet] = ()) -> Rest:
     """Others of the same system; only those that are sampled alike say something of its noise's colour."""
     alike = [one, *(other for other in others if other.period == one.period)]
+    if not _seen_early(alike):  # or the end of the rests, which shows the motion, hides a filter
+        early = _seen_early([each.without_the_last(EARLIEST) for each in alike])
+        one, *_ = alike = [each.without_the_last(early) for each in alike]
     colours: dict[str, Sequence[Colour]] = {}
+    period = one.period * 1e-6
     for quantity in dict.fromkeys(quantity for quantity, _ in one.values):
         rests = [(name, rest) for each in alike for (what, name), rest in each.values.items() if what == quantity]
-        of_all = colour_of([rest for _, rest in rests])
+        of_all = colour_of([rest for _, rest in rests], period)
         for name in dict.fromkeys(name for name, _ in rests):
-            colours[name] = of_all, colour_of([rest for its, rest in rests if its == name])
+            colours[name] = of_all, colour_of([rest for its, rest in rests if its == name], period)
     return Rest(one.ends, colours)
+
+
+def _seen_early(alike: Sequence[Quiet]) -> float:
+    """s before the motion begins in which the filters behind all channels of a quantity may show it; 0 for none."""
+    found = [0.0]
+    for quantity in dict.fromkeys(quantity for each in alike for quantity, _ in each.values):
+        rests = [rest for each in alike for (what, _), rest in each.values.items() if what == quantity]
+        found.append(seen_early(colour_of(rests, alike[0].period * 1e-6).corner))
+    return max(found)
 
 
 def rests_of(recordings: Sequence[Recording]) -> list[Rest]:

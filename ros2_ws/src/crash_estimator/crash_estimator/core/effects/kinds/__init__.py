@@ -10,10 +10,11 @@ from .gap import Gap
 from .guide_force import GuideForce
 from .pair_spring import PairSpring
 from .remembering_force import RememberingForce
+from .stated_spring import StatedSpring
 from .static_factor import StaticFactor
 from .unloading_slope import UnloadingSlope
 
 __all__ = [
     "AttachedBody", "BodyForce", "BodyInertia", "BodyStart", "ChannelError", "ElementForce", "Gap", "GuideForce",
-    "PairSpring", "RememberingForce", "StaticFactor", "UnloadingSlope",
+    "PairSpring", "RememberingForce", "StatedSpring", "StaticFactor", "UnloadingSlope",
 ]  # fmt: skip
