@@ -32,4 +32,5 @@ EFFECT = ElementForce(
     forms={"": (), "uneven": ("rebound",), "hunt_crossley": ("exponent",)},
 )
 """Limits of the rebound: a thousandth is nothing; the dampers of cars pull up to five times as hard as they push.
-Of the exponent: laws of contact have 1/4 (Tsuji and others 1992), 1/2, 1 and 3/2 (Hunt and Crossley)."""
+Of the exponent: laws of contact have 1/4 (Tsuji and others 1992), 1/2, 1 and 3/2 (Hunt and Crossley);
+above 2 a gas that leaks was told as this in one looked-at case."""

@@ -63,26 +63,35 @@ def quiet_of(recording: Recording) -> Quiet:
 def rest_of(one: Quiet, others: Sequence[Quiet] = ()) -> Rest:
     """Others of the same system; only those that are sampled alike say something of its noise's colour."""
     alike = [one, *(other for other in others if other.period == one.period)]
-    if not _seen_early(alike):  # or the end of the rests, which shows the motion, hides a filter
-        early = _seen_early([each.without_the_last(EARLIEST) for each in alike])
-        one, *_ = alike = [each.without_the_last(early) for each in alike]
+    of_all = _colours(alike)
+    if not _seen_early(of_all):  # or the end of the rests, which shows the motion, hides a filter
+        early = _seen_early(_colours([each.without_the_last(EARLIEST) for each in alike]))
+        if early:
+            one, *_ = alike = [each.without_the_last(early) for each in alike]
+            of_all = _colours(alike)
     colours: dict[str, Sequence[Colour]] = {}
-    period = one.period * 1e-6
-    for quantity in dict.fromkeys(quantity for quantity, _ in one.values):
-        rests = [(name, rest) for each in alike for (what, name), rest in each.values.items() if what == quantity]
-        of_all = colour_of([rest for _, rest in rests], period)
+    for quantity, common in of_all.items():
+        rests = _of_quantity(quantity, alike)
         for name in dict.fromkeys(name for name, _ in rests):
-            colours[name] = of_all, colour_of([rest for its, rest in rests if its == name], period)
+            colours[name] = common, colour_of([rest for its, rest in rests if its == name], one.period * 1e-6)
     return Rest(one.ends, colours)
 
 
-def _seen_early(alike: Sequence[Quiet]) -> float:
-    """s before the motion begins in which the filters behind all channels of a quantity may show it; 0 for none."""
-    found = [0.0]
-    for quantity in dict.fromkeys(quantity for each in alike for quantity, _ in each.values):
-        rests = [rest for each in alike for (what, _), rest in each.values.items() if what == quantity]
-        found.append(seen_early(colour_of(rests, alike[0].period * 1e-6).corner))
-    return max(found)
+def _of_quantity(quantity: str, alike: Sequence[Quiet]) -> list[tuple[str, np.ndarray]]:
+    """Channels and their values at rest."""
+    return [(name, rest) for each in alike for (what, name), rest in each.values.items() if what == quantity]
+
+
+def _colours(alike: Sequence[Quiet]) -> dict[str, Colour]:
+    """By quantity, of all its channels together."""
+    quantities = dict.fromkeys(quantity for each in alike for quantity, _ in each.values)
+    rests = {quantity: [rest for _, rest in _of_quantity(quantity, alike)] for quantity in quantities}
+    return {quantity: colour_of(rests[quantity], alike[0].period * 1e-6) for quantity in quantities}
+
+
+def _seen_early(colours: Mapping[str, Colour]) -> float:
+    """s before the motion begins in which the filters behind them may show it; 0 for none."""
+    return max((seen_early(colour.corner) for colour in colours.values()), default=0.0)
 
 
 def rests_of(recordings: Sequence[Recording]) -> list[Rest]:
