@@ -13,8 +13,9 @@ from crash_estimator.core.derived_motion import smoothed, with_accelerations
 from crash_estimator.core.diagnosis import diagnose, predict
 from crash_estimator.core.diagnosis.mechanics.linearization import linearise
 from crash_estimator.core.diagnosis.mechanics.outputs import predicted
+from crash_estimator.core.diagnosis.observation.grid import binned
 from crash_estimator.core.diagnosis.observation.record import observe
-from crash_estimator.core.diagnosis.output_error.normal_equations import binned, whitened
+from crash_estimator.core.diagnosis.output_error.normal_equations import whitened
 from crash_estimator.core.diagnosis.output_error.problem import make_problem
 from crash_estimator.core.diagnosis.output_error.simulation import simulate
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
@@ -163,7 +164,8 @@ def test_the_derivatives_of_motion_outputs_are_their_finite_differences(model, o
             there = simulate(problem, other, point.trajectories).trajectories[0]
             rows = linearise(experiment, other, there).rows
             moved.append(predicted(experiment, other, rows, there))
-        expected = binned(observed_record, equations.sampling.weight * (moved[0] - moved[1]) / (2.0 * step))[:, 0]
+        slope = equations.sampling.weight * (moved[0] - moved[1]) / (2.0 * step)
+        expected = binned(observed_record.bin, slope, observed_record.bins)[:, 0]
         column = found[:, list(equations.columns).index(parameter)]
         assert np.linalg.norm(expected) > 0.0
         assert np.linalg.norm(column - expected) < 0.01 * np.linalg.norm(expected), parameter

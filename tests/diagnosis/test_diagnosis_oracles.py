@@ -11,9 +11,10 @@ from scipy.optimize import least_squares, lsq_linear
 
 from crash_estimator.core.diagnosis.mechanics.linearization import linearise
 from crash_estimator.core.diagnosis.mechanics.outputs import predicted
+from crash_estimator.core.diagnosis.observation.grid import binned
 from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.output_error.gauss_newton import fit, solve
-from crash_estimator.core.diagnosis.output_error.normal_equations import binned, normal_equations, whitened
+from crash_estimator.core.diagnosis.output_error.normal_equations import normal_equations, whitened
 from crash_estimator.core.diagnosis.output_error.problem import OutputErrorProblem, Point, make_problem
 from crash_estimator.core.diagnosis.output_error.simulation import simulate
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
@@ -203,7 +204,7 @@ def assert_derivatives_agree(model: Structure, recording: Recording, near: float
             moved.append(outputs(problem, simulate(problem, theta, point.trajectories)))
         slope = np.zeros((len(record.time), moved[0].shape[1]))
         slope[record.at] = (moved[0] - moved[1]) / (2.0 * step)
-        expected = binned(record, equations.sampling.weight * slope)
+        expected = binned(record.bin, equations.sampling.weight * slope, record.bins)
         found = by_equations[:, :, list(equations.columns).index(parameter)]
         assert np.linalg.norm(expected) > 0.0
         assert np.linalg.norm(found - expected) < near * np.linalg.norm(expected), problem.layout.names[parameter]

@@ -7,9 +7,9 @@ from numpy.testing import assert_allclose
 
 from crash_estimator.core.diagnosis.mechanics.linearization import linearise
 from crash_estimator.core.diagnosis.mechanics.link_force import link_force
+from crash_estimator.core.diagnosis.observation.grid import binned
 from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.output_error.gauss_newton import fit
-from crash_estimator.core.diagnosis.output_error.normal_equations import binned
 from crash_estimator.core.diagnosis.output_error.problem import make_problem
 from crash_estimator.core.diagnosis.output_error.sensitivity_equations import propagate, respond
 from crash_estimator.core.diagnosis.parameterization.free_curve import value
@@ -34,7 +34,7 @@ def test_a_small_change_of_the_parameters_is_felt_as_the_sum_of_their_columns(st
     accelerations = respond(equations.linear, change)
     free = [q for q, output in enumerate(layout.outputs) if not output.fixed]
     shown = accelerations[:, [layout.outputs[q].body for q in free]]
-    expected = binned(record, equations.sampling.weight[:, free] * shown)
+    expected = binned(record.bin, equations.sampling.weight[:, free] * shown, record.bins)
     assert_allclose((out @ change)[:, free], expected, atol=1e-9 * np.abs(expected).max())
 
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from crash_estimator.core.diagnosis.mechanics.driven_motion import driven_by, driven_motion
 from crash_estimator.core.diagnosis.mechanics.masses import attached_inertia
-from crash_estimator.core.diagnosis.observation.grid import DRIVEN_MODES, cosines_of
+from crash_estimator.core.diagnosis.observation.grid import DRIVEN_MODES, on_grid
 from crash_estimator.core.diagnosis.observation.tracked_motion import tracked_acceleration
 from crash_estimator.core.diagnosis.observation.trajectory import element_motion
 from crash_estimator.core.effects import EFFECTS
@@ -19,6 +19,7 @@ TIME = np.arange(400) * 1e-4
 LEFT, RIGHT = 300.0 * np.sin(120.0 * TIME), 280.0 * np.sin(120.0 * TIME + 0.1)
 ERRORS = (("channel_gain", "left"), ("channel_offset", "left"), ("channel_delay", "left"), ("channel_gain", "right"))
 FIRST_MODE = len(ERRORS)
+COSINES = on_grid(TIME, np.arange(len(TIME)))["cosines"]
 THETA = np.concatenate([[0.05, 12.0, 3.3e-4, -0.03], np.linspace(4.0, 1.0, DRIVEN_MODES + 1)])
 
 
@@ -36,7 +37,7 @@ def experiment():
         name: SimpleNamespace(time=TIME, values=values, on_grid=values)
         for name, values in (("left", LEFT), ("right", RIGHT))
     }
-    return layout, SimpleNamespace(time=TIME, step=1e-4, signals=signals, cosines=cosines_of(TIME)), 0
+    return layout, SimpleNamespace(time=TIME, step=1e-4, signals=signals, cosines=COSINES), 0
 
 
 def test_it_moves_with_the_mean_of_what_they_should_have_recorded():
@@ -44,7 +45,7 @@ def test_it_moves_with_the_mean_of_what_they_should_have_recorded():
     late = np.interp(TIME + THETA[2], TIME, LEFT)
     course = EFFECTS["channel_offset"].course("", TIME)
     expected = 0.5 * ((late - THETA[1] * course) / (1.0 + THETA[0]) + RIGHT / (1.0 + THETA[3]))
-    expected += cosines_of(TIME) @ THETA[FIRST_MODE:]
+    expected += COSINES @ THETA[FIRST_MODE:]
     found = driven_motion(experiment(), THETA)
     assert not found[:, 0].any()
     assert_allclose(found[inside, 1], expected[inside], atol=1e-9)

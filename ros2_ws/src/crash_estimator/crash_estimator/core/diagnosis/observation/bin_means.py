@@ -5,7 +5,7 @@ A mean over a bin is a sample with less noise, at the bin's centre; what is fast
 
 import numpy as np
 
-from .grid import cosines_of, on_grid
+from .grid import on_grid
 from .record import ObservedRecord, Signal
 
 STEP = 5e-4
@@ -31,20 +31,14 @@ def in_bins(record: ObservedRecord) -> ObservedRecord:
     bin_ = np.concatenate([[-1], np.arange(bins)])
     grid = np.concatenate([[0.0], centre])
     return record._replace(
-        time=grid,
-        dt=np.diff(grid, prepend=0.0),
-        step=float(np.median(np.diff(grid))),
-        at=np.arange(1, bins + 1),
-        period=float(np.median(np.diff(centre))),
+        **on_grid(grid, np.arange(1, bins + 1)),
         measured=mean,
-        on_grid=on_grid(grid, np.arange(1, bins + 1), mean),
         noise=record.noise / np.sqrt(per_bin),
         weight=None,
         signals={name: _in_bins(signal, used, per_bin, grid) for name, signal in record.signals.items()},
         bin=bin_,
         valid=np.concatenate([np.zeros((1, mean.shape[1])), np.sqrt(count / per_bin)]),
         bins=bins,
-        cosines=cosines_of(grid),
     )
 
 

@@ -1,6 +1,11 @@
 """The instants of a record, and the bins that its outputs are compared in."""
 
+from typing import Any
+
 import numpy as np
+from numba import njit
+
+from ... import compile_cache as _compile_cache  # noqa: F401  before any compiled function is defined
 
 BIN = 4e-4
 """s: length of the bins that outputs are averaged over; they keep what is below 1250 Hz, and a crash model says nothing
@@ -27,16 +32,32 @@ def grid_of(sample_time: np.ndarray, longest: float) -> tuple[np.ndarray, np.nda
     return np.append(time, stops[-1]), index[len(stops) - len(sample_time) :]
 
 
-def on_grid(time: np.ndarray, at: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """`on_grid` of an ObservedRecord."""
-    found = np.zeros((len(time), measured.shape[1]))
-    found[at] = np.nan_to_num(measured)
+def on_grid(time: np.ndarray, at: np.ndarray) -> dict[str, Any]:
+    """What an ObservedRecord says of its instants, and of the samples at some of them."""
+    dt = np.diff(time, prepend=time[0])
+    return {
+        "time": time,
+        "dt": dt,
+        "step": float(np.median(dt[1:])),
+        "at": at,
+        "period": float(np.median(np.diff(time[at]))),
+        "cosines": np.cos(np.outer(np.pi * time / time[-1], np.arange(DRIVEN_MODES + 1))),
+    }
+
+
+def binned(bin_: np.ndarray, values: np.ndarray, bins: int) -> np.ndarray:
+    """(bins, columns) sums of values (n, columns), each in its bin (n,); -1: in none."""
+    found = np.zeros((bins, values.shape[1]))
+    _add_up(bin_, values, found)
     return found
 
 
-def cosines_of(time: np.ndarray) -> np.ndarray:
-    """`cosines` of an ObservedRecord on a grid of instants."""
-    return np.cos(np.outer(np.pi * time / time[-1], np.arange(DRIVEN_MODES + 1)))
+@njit(cache=True)
+def _add_up(bin_, values, found):
+    for k in range(values.shape[1]):
+        for t in range(len(bin_)):
+            if bin_[t] >= 0:
+                found[bin_[t], k] += values[t, k]
 
 
 def bins_of(
@@ -54,8 +75,7 @@ def bins_of(
     ok = np.isfinite(measured).astype(float)
     # at the very impact forces may jump: on which side this sample lies is chance
     ok[time[at] < max(mixed, 1e-9)] = 0.0
-    count = np.zeros((bins, measured.shape[1]))
-    np.add.at(count, bin_[at], ok)
+    count = binned(bin_[at], ok, bins)
     valid = np.zeros((len(time), measured.shape[1]))
     valid[at] = ok / np.sqrt(np.maximum(count[bin_[at]], 1.0))
     return bin_, valid, bins

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.fft import dct
 
-from .grid import bins_of
+from .grid import binned, bins_of
 from .record import ObservedRecord
 
 CFC = 60
@@ -36,9 +36,7 @@ def with_inflated_noise(
     for record, residual in zip(records, residuals):
         bin_, valid, bins = bins_of(record.time, record.at, record.measured, BIN, record.seen_early)
         weight = valid[record.at] / record.noise
-        z = np.zeros((bins, residual.shape[1]))
-        np.add.at(z, bin_[record.at], np.nan_to_num(residual) * weight)
-        spectrum = dct(z, norm="ortho", axis=0)
+        spectrum = dct(binned(bin_[record.at], np.nan_to_num(residual) * weight, bins), norm="ortho", axis=0)
         frequency = np.arange(bins) / (2.0 * float(record.time[-1]))
         bands = [(frequency >= a) & (frequency < b) for a, b in zip(EDGES, EDGES[1:])]
         powers.append(spectrum.T @ spectrum / bins)

@@ -18,7 +18,7 @@ from ...kinematics import Kinematics, zero_crush
 from ...noise_spectrum import NoiseSpectrum
 from ...sensor_noise import sensor_noise
 from ...structure import ModelError, Structure
-from .grid import bins_of, cosines_of, grid_of, on_grid
+from .grid import bins_of, grid_of, on_grid
 from .pace import longest_step
 from .rest import Rest, bridged, rests_of
 from .tracked_motion import tracked_acceleration
@@ -75,7 +75,6 @@ class ObservedRecord(NamedTuple):
     at: np.ndarray  # (n,) indices of the samples on the grid
     period: float  # s, median between samples
     measured: np.ndarray  # (n, q) zero offset removed, NaN where not valid
-    on_grid: np.ndarray  # (g, q) the same at all instants, 0 where there is no valid sample
     noise: np.ndarray  # (q,) standard deviation of a sample of white noise as strong as this one is where bodies move
     spectra: tuple[NoiseSpectrum, ...]  # (q,) of a sample; known from inf samples where the model states it
     offset_std: np.ndarray  # (q,)
@@ -213,13 +212,8 @@ def observe(structure: Structure, recording: Recording, rest: Rest | None = None
     bin_, valid, bins = bins_of(time, at, measured, mixed=_seen_early(spectra))
     record = ObservedRecord(
         test=recording.test,
-        time=time,
-        dt=np.diff(time, prepend=time[0]),
-        step=float(np.median(np.diff(time))),
-        at=at,
-        period=float(np.median(np.diff(time[at]))),
+        **on_grid(time, at),
         measured=measured,
-        on_grid=on_grid(time, at, measured),
         noise=np.array([spectrum.std for spectrum in spectra]),
         spectra=tuple(spectra),
         offset_std=np.array([_offset_std(signals[o.channel], o) for o in outputs]),
@@ -229,7 +223,6 @@ def observe(structure: Structure, recording: Recording, rest: Rest | None = None
         bin=bin_,
         valid=valid,
         bins=bins,
-        cosines=cosines_of(time),
     )
     return record.in_band(np.inf)
 

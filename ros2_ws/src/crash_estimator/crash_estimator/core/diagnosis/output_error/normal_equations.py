@@ -10,6 +10,7 @@ from ... import compile_cache as _compile_cache  # noqa: F401  before any compil
 from ..mechanics.driven_motion import measured_motion
 from ..mechanics.linearization import Equations, Observer, OtherLaw, linearise
 from ..mechanics.outputs import by_channel_errors, output_noise, predicted
+from ..observation.grid import binned
 from ..observation.record import ObservedRecord
 from ..observation.trajectory import Trajectory
 from ..parameterization.experiment import Experiment
@@ -89,7 +90,7 @@ def _put(columns, products, matrix, vector):
 
 def _filled(record: ObservedRecord) -> np.ndarray:
     """(q,) bins with a valid sample, as many as are compared."""
-    return np.count_nonzero(binned(record, record.valid), axis=0) * record.compared
+    return np.count_nonzero(binned(record.bin, record.valid, record.bins), axis=0) * record.compared
 
 
 def whitened(
@@ -107,26 +108,12 @@ def whitened(
     weight = equations.sampling.weight
     position = {int(p): j + 1 for j, p in enumerate(equations.columns[: equations.linear.others - 1])}
     for q, parameter, column in by_channel_errors(experiment, theta, equations.rows, trajectory):
-        out[:, q, position[parameter]] += binned(record, (weight[:, q] * column)[:, None])[:, 0]
+        out[:, q, position[parameter]] += binned(record.bin, (weight[:, q] * column)[:, None], record.bins)[:, 0]
     # along the trajectory: the free bodies' own acceleration less the observer's; fixed forces are in column 0
     along = np.where(layout.kind == FREE, trajectory.a, 0.0)
     if observer:
         along += np.where(layout.kind == FREE, observer.acceleration(trajectory), 0.0)
-    misfit = record.on_grid - predicted(experiment, theta, along, trajectory)
-    out[:, :, 0] = binned(record, weight * misfit) - out[:, :, 0]
+    misfit = -predicted(experiment, theta, along, trajectory)
+    misfit[record.at] += np.nan_to_num(record.measured)
+    out[:, :, 0] = binned(record.bin, weight * misfit, record.bins) - out[:, :, 0]
     return record.whitened(out, in_time)
-
-
-def binned(record: ObservedRecord, values: np.ndarray) -> np.ndarray:
-    """(bins, columns) sums of values (g, columns) at the samples."""
-    found = np.zeros((record.bins, values.shape[1]))
-    _add_up(record.bin, values, found)
-    return found
-
-
-@njit(cache=True)
-def _add_up(bins, values, found):
-    for k in range(values.shape[1]):
-        for t in range(len(bins)):
-            if bins[t] >= 0:
-                found[bins[t], k] += values[t, k]

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...effects.effect import Addition, ElementMotion, Shape
 from ...structure import Element, Structure
+from ..observation.grid import binned
 from ..observation.record import ObservedRecord, outputs_of
 from ..observation.trajectory import Trajectory, element_motion, integrate, measured_trajectory
 from .free_curve import make_knots
@@ -170,8 +171,8 @@ def measure_magnitudes(
 
 def _peak(record: ObservedRecord, rows: list[int]) -> float:
     """Largest mean over a bin of a body's outputs."""
-    sums, found = np.zeros((record.bins, 2)), record.measured[:, rows]
+    found = record.measured[:, rows]
     known = np.isfinite(found)
     each = np.stack([np.where(known, found, 0.0).sum(axis=1), known.sum(axis=1)], axis=1)
-    np.add.at(sums, record.bin[record.at], each)
-    return float(np.abs(sums[:, 0] / np.maximum(sums[:, 1], 1.0)).max())
+    total, count = binned(record.bin[record.at], each, record.bins).T
+    return float(np.abs(total / np.maximum(count, 1.0)).max())

@@ -21,6 +21,7 @@ from scipy.special import chdtrc
 
 from ..mechanics.linearization import Equations, linearise
 from ..mechanics.outputs import predicted
+from ..observation.grid import binned
 from ..observation.trajectory import Trajectory
 from ..output_error.gauss_newton import Fit, solve
 from ..output_error.normal_equations import Normal, may_diverge, whitened
@@ -148,5 +149,5 @@ def _of_sensors(
     found = np.zeros((record.bins, q, q, MODES))
     for n in range(q):
         column = (equations.sampling.weight[:, n] * shown[:, n])[:, None] * modes
-        np.add.at(found[:, n, n], record.bin[record.at], column[record.at])
+        found[:, n, n] = binned(record.bin, column, record.bins)
     return record.whitened(found.reshape(record.bins, q, -1), in_time=False)
