@@ -87,10 +87,6 @@ class NoiseSpectrum(NamedTuple):
         return self.std * float(np.sqrt((self.density(frequency) * _gain(frequency / self.corner) ** 2).mean()))
 
     @property
-    def seen_early(self) -> float:
-        return seen_early(self.corner)
-
-    @property
     def passed(self) -> float:
         """Hz up to which the channel is compared: beyond, a filter has taken away what moves."""
         return PASSED * self.corner

@@ -20,7 +20,7 @@ from ...sensor_noise import sensor_noise
 from ...structure import ModelError, Structure
 from .grid import bins_of, grid_of, on_grid
 from .pace import longest_step
-from .rest import Rest, bridged, rests_of
+from .rest import Rest, bridged, rests_of, seen_early_by
 from .tracked_motion import tracked_acceleration
 from .whitening import coefficients, filtered, weights
 
@@ -109,10 +109,6 @@ class ObservedRecord(NamedTuple):
         weight = weights(self.spectra, below, self.bins, self.period, self.per_bin)
         return self._replace(below=below, weight=weight)
 
-    def doubted(self) -> "ObservedRecord":
-        """With masses and zeros that may err as such do."""
-        return self._replace(in_doubt=True)
-
     @property
     def compared(self) -> np.ndarray:
         """(q,) share of the frequencies."""
@@ -121,7 +117,7 @@ class ObservedRecord(NamedTuple):
     @property
     def seen_early(self) -> float:
         """s by which a filter that runs backward, too, may show a motion before it begins."""
-        return _seen_early(self.spectra)
+        return seen_early_by(self.spectra)
 
     @property
     def kick(self) -> np.ndarray:
@@ -206,17 +202,19 @@ def observe(structure: Structure, recording: Recording, rest: Rest | None = None
             name, x = body.acceleration[0], signals[body.displacement]
             path = CubicSpline(x.time, smoothed(x.values, recording.sample_period).value)
             signals[name] = signals[name]._replace(on_grid=tracked_acceleration(time, path, *start[:, k]))
-    measured = np.stack([_raw(recording, o.channel, signals[o.channel])[after] for o in outputs], axis=1)
+    seen = [(o, signals[o.channel], np.isfinite(recording.column(o.channel))) for o in outputs]
+    measured = np.stack([np.where(valid, signal.values, np.nan)[after] for _, signal, valid in seen], axis=1)
     given = [structure.bodies[o.body].noise for o in outputs]
     spectra = [NoiseSpectrum(g, np.inf) if g else signals[o.channel].spectrum for g, o in zip(given, outputs)]
-    bin_, valid, bins = bins_of(time, at, measured, mixed=_seen_early(spectra))
+    bin_, valid, bins = bins_of(time, at, measured, mixed=seen_early_by(spectra))
     record = ObservedRecord(
         test=recording.test,
         **on_grid(time, at),
         measured=measured,
         noise=np.array([spectrum.std for spectrum in spectra]),
         spectra=tuple(spectra),
-        offset_std=np.array([_offset_std(signals[o.channel], o) for o in outputs]),
+        # a displacement counts from anywhere: as much as it spreads
+        offset_std=np.array([np.std(s.values) if o.of_motion == 2 else s.offset_std for o, s, _ in seen]),
         signals=signals,
         initial_displacement=kinematics.initial_displacement,
         initial_velocity=kinematics.initial_velocity,
@@ -259,16 +257,3 @@ def _from_rest(crush: Signal, tension: bool, rest_ends: int) -> Signal:
     before = crush.values[crush.time * 1e9 < rest_ends]
     zero = zero_crush(float(before.mean()), float(before[-1]), tension) if len(before) else 0.0
     return crush._replace(values=crush.values - zero, on_grid=crush.on_grid - zero)
-
-
-def _seen_early(spectra: Sequence[NoiseSpectrum]) -> float:
-    return max((spectrum.seen_early for spectrum in spectra), default=0.0)
-
-
-def _offset_std(signal: Signal, output: Output) -> float:
-    """A displacement counts from anywhere: as much as it spreads."""
-    return float(np.std(signal.values)) if output.of_motion == 2 else signal.offset_std
-
-
-def _raw(recording: Recording, name: str, signal: Signal) -> np.ndarray:
-    return np.where(np.isfinite(recording.column(name)), signal.values, np.nan)

@@ -6,7 +6,7 @@ where that hides the filter, the end of what is said to rest is left out.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from crash_replay.conditioning import CFC_CLASSES, RESTS_AT_ZERO
 from crash_replay.onset import find_onset
 from crash_replay.recording import Recording
 
-from ...noise_spectrum import CORNER, Colour, colour_of, seen_early
+from ...noise_spectrum import CORNER, Colour, NoiseSpectrum, colour_of, seen_early
 from ...sensor_noise import ENOUGH
 
 EARLIEST = seen_early(CORNER * min(CFC_CLASSES))
@@ -64,8 +64,8 @@ def rest_of(one: Quiet, others: Sequence[Quiet] = ()) -> Rest:
     """Others of the same system; only those that are sampled alike say something of its noise's colour."""
     alike = [one, *(other for other in others if other.period == one.period)]
     of_all = _colours(alike)
-    if not _seen_early(of_all):  # or the end of the rests, which shows the motion, hides a filter
-        early = _seen_early(_colours([each.without_the_last(EARLIEST) for each in alike]))
+    if not seen_early_by(of_all.values()):  # or the end of the rests, which shows the motion, hides a filter
+        early = seen_early_by(_colours([each.without_the_last(EARLIEST) for each in alike]).values())
         if early:
             one, *_ = alike = [each.without_the_last(early) for each in alike]
             of_all = _colours(alike)
@@ -89,9 +89,9 @@ def _colours(alike: Sequence[Quiet]) -> dict[str, Colour]:
     return {quantity: colour_of(rests[quantity], alike[0].period * 1e-6) for quantity in quantities}
 
 
-def _seen_early(colours: Mapping[str, Colour]) -> float:
+def seen_early_by(noises: Iterable[Colour | NoiseSpectrum]) -> float:
     """s before the motion begins in which the filters behind them may show it; 0 for none."""
-    return max((seen_early(colour.corner) for colour in colours.values()), default=0.0)
+    return max((seen_early(noise.corner) for noise in noises), default=0.0)
 
 
 def rests_of(recordings: Sequence[Recording]) -> list[Rest]:

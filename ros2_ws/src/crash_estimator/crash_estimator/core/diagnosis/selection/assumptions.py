@@ -176,7 +176,7 @@ def _as_exact_as_needed(
     magnitudes, given = _as_given(structure, records, effects)
     if records[0].in_doubt:
         return _with_curves_as_fine_as_needed(magnitudes, given, effects, expected, elsewhere)
-    doubted = magnitudes._replace(records=[record.doubted() for record in records])
+    doubted = magnitudes._replace(records=[record._replace(in_doubt=True) for record in records])
     start, path = _in_doubt(doubted, given), None
     if not _leaves_noise(start):
         path = _with_curves_as_fine_as_needed(magnitudes, given, effects, expected, elsewhere)
