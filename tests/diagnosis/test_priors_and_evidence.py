@@ -13,7 +13,7 @@ from crash_estimator.core.diagnosis.output_error.normal_equations import Normal
 from crash_estimator.core.diagnosis.output_error.problem import embedding
 from crash_estimator.core.diagnosis.parameterization.free_curve import ROUGHNESS, Curve, adapted_roughness
 from crash_estimator.core.diagnosis.parameterization.layout import _element_link, _modes
-from crash_estimator.core.diagnosis.parameterization.prior import Builder as PriorBuilder
+from crash_estimator.core.diagnosis.parameterization.prior import Builder
 from crash_estimator.core.diagnosis.residuals.score_test import _statistic
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.structure import Body, Coefficient, Element, Structure
@@ -75,28 +75,16 @@ def test_a_step_is_shortened_by_its_largest_change_of_a_shape_alone():
     assert _shorten(np.array([1e6]), np.array([], dtype=int)) == 1.0
 
 
-class Builder:
-    """What a layout is built with, as far as it is asked here."""
-
-    def __init__(self):
-        self.start, self.names, self.std = [], [], []
-
-    def add(self, name, start, std, **_):
-        self.start.append(start)
-        self.names.append(name)
-        self.std.append(std)
-        return len(self.start) - 1
-
-
 def test_the_mean_of_two_sensors_has_an_error_smaller_by_the_root_of_two():
     body = SimpleNamespace(driven=True, acceleration=("left", "right"))
     signal = SimpleNamespace(noise=3.0, offset_std=0.4)
     record = SimpleNamespace(at=np.arange(900), signals={"left": signal, "right": signal})
     builder = Builder()
     found = _modes(builder, SimpleNamespace(bodies=[body]), record, {})
-    assert found == {0: range(len(builder.std))}
-    assert builder.std[0] == pytest.approx(np.hypot(0.4, 3.0 / 30.0) / np.sqrt(2.0))
-    assert builder.std[1:] == pytest.approx(np.full(len(builder.std) - 1, 3.0 * np.sqrt(2.0 / 900.0) / np.sqrt(2.0)))
+    mean, *others = [one.std for one in builder.parameters]
+    assert found == {0: range(1 + len(others))}
+    assert mean == pytest.approx(np.hypot(0.4, 3.0 / 30.0) / np.sqrt(2.0))
+    assert others == pytest.approx(np.full(len(others), 3.0 * np.sqrt(2.0 / 900.0) / np.sqrt(2.0)))
 
 
 @pytest.mark.parametrize(
@@ -108,7 +96,7 @@ def test_a_spring_has_a_constant_only_where_it_is_unknown_and_no_curve(estimated
     magnitudes = SimpleNamespace(stiffness=[1e5], force=[1e4], rate=[10.0])
     builder = Builder()
     _element_link(builder, 0, element, {"car": 0, "wall": 1}, curve, magnitudes, (), [])
-    assert builder.names == names
+    assert [one.name for one in builder.parameters] == names
 
 
 @pytest.mark.parametrize(
@@ -126,7 +114,7 @@ def test_a_gap_to_both_sides_is_sought_of_an_element_that_can_pull_and_has_been_
 
 def test_a_curve_s_force_at_no_crush_is_no_parameter():
     """Its column there is -1, as everywhere where there is none."""
-    curve = PriorBuilder().curve("spring", np.array([-0.1, 0.0, 0.1]), 0.1, 1e4, 1.0)
+    curve = Builder().curve("spring", np.array([-0.1, 0.0, 0.1]), 0.1, 1e4, 1.0)
     assert curve.column.tolist() == [0, -1, 1]
 
 

@@ -102,7 +102,7 @@ def make_layout(
             name = _touch_name(addition)
             curve = b.curve(name, at, crush, force, roughness.get(name, ROUGHNESS), 0.0)
             touching.append((addition, curve))
-    knots = len(b.start)
+    knots = len(b.parameters)
     links, terms = [], []
     for k, element in enumerate(structure.elements):
         links.append(_element_link(b, k, element, index, curves[k], magnitudes, additions, terms))
@@ -130,20 +130,20 @@ def make_layout(
     terms += [_term(b, one, magnitudes) for one in additions if not any(one is other for other in placed)]
     terms.sort(key=lambda term: next(k for k, addition in enumerate(additions) if addition is term.addition))
     weighed = _weighed(b, structure) if records[0].in_doubt else {}
-    common = len(b.start)
+    common = len(b.parameters)
     outputs = comparable(outputs_of(structure), structure, records)
     offsets, drifts, modes, kicks = [], [], [], []
     for r, record in enumerate(records):
-        offsets.append(len(b.start))
+        offsets.append(len(b.parameters))
         for q in range(len(outputs)):
             b.add("offset", 0.0, record.offset_std[q])
         drifts.append(_drifts(b, outputs, record) if record.in_doubt else {})
         modes.append(_modes(b, structure, record, attached))
         kicks.append(_kicks(b, structure, magnitudes.measured[r]))
     return Layout(
-        structure, tuple(links), bodies, np.array(kind), outputs, knots, common, len(b.start), tuple(terms),
-        attached, tuple(offsets), tuple(drifts), tuple(modes), tuple(kicks), weighed, b.prior(), np.array(b.start),
-        tuple(b.names[knots:common]),
+        structure, tuple(links), bodies, np.array(kind), outputs, knots, common, len(b.parameters), tuple(terms),
+        attached, tuple(offsets), tuple(drifts), tuple(modes), tuple(kicks), weighed, b.prior(),
+        np.array([one.start for one in b.parameters]), tuple(one.name for one in b.parameters[knots:common]),
     )  # fmt: skip
 
 
@@ -255,7 +255,7 @@ def _modes(b: Builder, structure: Structure, record: ObservedRecord, attached: d
     for k, channels, count in driven + [(k, (channel,), ATTACHED_MODES) for channel, k in attached.items()]:
         noise = np.sqrt(sum(record.signals[c].noise ** 2 for c in channels)) / len(channels)
         offset = np.sqrt(sum(record.signals[c].offset_std ** 2 for c in channels)) / len(channels)
-        found[k] = range(len(b.start), len(b.start) + 1 + count)
+        found[k] = range(len(b.parameters), len(b.parameters) + 1 + count)
         b.add("mode", 0.0, np.hypot(offset, noise / np.sqrt(samples)))
         for _ in range(count):
             b.add("mode", 0.0, noise * np.sqrt(2.0 / samples))

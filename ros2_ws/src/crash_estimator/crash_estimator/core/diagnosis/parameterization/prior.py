@@ -17,25 +17,25 @@ class Prior(NamedTuple):
     high: np.ndarray  # (p,)
 
 
+class Parameter(NamedTuple):
+    name: str
+    start: float
+    std: float
+    mean: float
+    low: float
+    high: float
+
+
 class Builder:
     """Collects parameters one by one."""
 
     def __init__(self):
-        self.mean: list[float] = []
-        self.std: list[float] = []
-        self.low: list[float] = []
-        self.high: list[float] = []
-        self.start: list[float] = []
-        self.names: list[str] = []
+        self.parameters: list[Parameter] = []
         self.blocks: list[tuple[np.ndarray, np.ndarray]] = []
 
     def add(self, name: str, start: float, std: float, mean=0.0, low=-np.inf, high=np.inf) -> int:
-        self.names.append(name)
-        for column, item in zip(
-            (self.start, self.std, self.mean, self.low, self.high), (start, max(std, LEAST_STD), mean, low, high)
-        ):
-            column.append(item)
-        return len(self.start) - 1
+        self.parameters.append(Parameter(name, start, max(std, LEAST_STD), mean, low, high))
+        return len(self.parameters) - 1
 
     def curve(
         self,
@@ -55,7 +55,9 @@ class Builder:
         return Curve(knots, column, crush, force)
 
     def prior(self) -> Prior:
-        precision = np.diag(1.0 / np.array(self.std) ** 2)
+        precision = np.diag(1.0 / np.array([one.std for one in self.parameters]) ** 2)
         for columns, block in self.blocks:
             precision[np.ix_(columns, columns)] += block
-        return Prior(np.array(self.mean), precision, np.array(self.low), np.array(self.high))
+        mean = np.array([one.mean for one in self.parameters])
+        low = np.array([one.low for one in self.parameters])
+        return Prior(mean, precision, low, np.array([one.high for one in self.parameters]))
