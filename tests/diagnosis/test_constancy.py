@@ -22,7 +22,7 @@ def drift(drawn: HiddenCase) -> tuple[Drift, bool]:
     """Of the model as given, fitted to recordings at two speeds; and whether its residual looks white."""
     structure = ModelFile.model_validate(dict(drawn.specimen.model)).structure()
     records = [observe(structure, drawn.record(speed, 1.0)[0]) for speed in (0.75, 1.1)]
-    model = fit_model(measure_magnitudes(structure, records, 36), records, ())
+    model = fit_model(measure_magnitudes(structure, records), records, ())
     return drift_of(model.fit), model.white
 
 

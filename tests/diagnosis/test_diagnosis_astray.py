@@ -41,7 +41,7 @@ def fitted(*case):
     """Magnitudes and the model as given."""
     structure, recording = drawn(*case)
     records = [observe(structure, recording)]
-    magnitudes = measure_magnitudes(structure, records, 36)
+    magnitudes = measure_magnitudes(structure, records)
     return magnitudes, fit_model(magnitudes, records, ())
 
 

@@ -134,7 +134,7 @@ def problem_of(model: Structure, recording: Recording) -> tuple[OutputErrorProbl
     """The problem of a model, and its simulation with the coefficients that it states."""
     records = [observe(model, recording)]
     magnitudes = measure_magnitudes(model, records, 12)
-    problem = make_problem(magnitudes, records, additions_of(model, magnitudes, EFFECTS))
+    problem = make_problem(magnitudes, records, additions_of(magnitudes, EFFECTS))
     start = problem.layout.start
     return problem, simulate(problem, start, problem.measured(start).trajectories)
 

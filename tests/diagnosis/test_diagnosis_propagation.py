@@ -19,7 +19,7 @@ from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_m
 def fitted(structure: str):
     _, model, recording = hidden_case(structure, "", 8201)
     records = [observe(model, recording)]
-    problem = make_problem(measure_magnitudes(model, records, 36), records, ())
+    problem = make_problem(measure_magnitudes(model, records), records, ())
     return problem.layout, records[0], fit(problem)
 
 

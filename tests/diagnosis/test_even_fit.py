@@ -26,7 +26,7 @@ def observed():
     case = draw_case("side", ("coulomb_friction",), 70601)
     structure = ModelFile.model_validate(dict(case.specimen.model)).structure()
     records = [observe(structure, case.record(1.0, 1.0)[0])]
-    magnitudes = measure_magnitudes(structure, records, 36)
+    magnitudes = measure_magnitudes(structure, records)
     return magnitudes, records, fit_model(magnitudes, records, ())
 
 

@@ -70,7 +70,7 @@ def test_the_two_ways_differ_by_far_more_than_noise():
     structure, recordings, _ = case(NeverPulls)
     records = [observe(structure, recording) for recording in recordings]
     pulling, pushing = (
-        fit_model(measure_magnitudes(assumed, records, 36), records, ())
+        fit_model(measure_magnitudes(assumed, records), records, ())
         for assumed in (structure, never_pulling(structure))
     )
     assert pushing.residuals.band_test.white and pushing.fit.evidence > pulling.fit.evidence + 100.0

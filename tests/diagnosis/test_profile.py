@@ -20,8 +20,6 @@ from crash_estimator.core.effects.kinds.body_inertia import LEFT_OUT, WEIGHED
 from crash_estimator.model_file import ModelFile
 from crash_replay.synthetic.hidden.cases import draw_case
 
-CELLS = 36
-
 
 def drawn(structure: str, seed: int, noise: float):
     """-> what is hidden: a slope on which an element unloads; the model without it; two recordings."""
@@ -50,7 +48,7 @@ def test_where_a_jump_stops_every_other_fit_the_profile_arrives(seed, noise):
     """Side impacts whose barrier lets go of the door while its damper still pulls: the noise floor, and the slope."""
     hidden, structure, recordings = drawn("side", seed, noise)
     records = [observe(structure, recording) for recording in recordings]
-    magnitudes = measure_magnitudes(structure, records, CELLS)
+    magnitudes = measure_magnitudes(structure, records)
     base = fit_model(magnitudes, records, ())
     offered = [a for a in candidates(magnitudes, EFFECTS) if a.key == (hidden.effect, hidden.target)]
     problem = make_problem(magnitudes, records, [offered[0]], base.roughness)
@@ -76,7 +74,7 @@ def test_a_mass_stands_as_it_was_weighed_where_a_law_does_as_well():
 def test_a_mass_is_believed_like_any_effect_where_a_force_or_another_body_is_measured():
     hidden, structure, recordings = drawn("impactor", 420012, 0.5)
     records = [observe(structure, recording) for recording in recordings]
-    magnitudes = measure_magnitudes(structure, records, CELLS)
+    magnitudes = measure_magnitudes(structure, records)
     offered = {a.effect.name: a for a in candidates(magnitudes, EFFECTS)}
     assert offered["added_mass"].effect.log_prior_odds_against(structure, 1.0) == WEIGHED
     assert offered["plastic_unloading"].effect.log_prior_odds_against(structure, 1.0) == 0.0

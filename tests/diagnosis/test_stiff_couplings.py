@@ -17,7 +17,6 @@ from crash_estimator.core.effects import EFFECTS
 from crash_estimator.model_file import ModelFile
 from crash_replay.second_generator.cases import case_of, drawn
 
-CELLS = 36
 CASE = "cab/nothing/1g/masses/61000016"
 """An engine on a mount of 0.6 MN/m, which is all that is stated of it; nothing is hidden."""
 
@@ -27,7 +26,7 @@ def given():
     it = drawn(case_of(CASE))
     structure = ModelFile.model_validate(yaml.safe_load(it.model_text)).structure()
     records = [observe(structure, recording) for recording in it.recordings]
-    return measure_magnitudes(structure, records, CELLS), records
+    return measure_magnitudes(structure, records), records
 
 
 def test_a_model_whose_mount_was_found_too_soft_is_fitted_again_from_what_is_stated(given):
@@ -68,7 +67,7 @@ def test_what_the_measured_motion_promises_is_fitted_without_stiffnesses_as_they
     """From these no fit finds it."""
     _, structure, recordings = drawn_case(first_case(YIELDS))
     records = [observe(structure, recording) for recording in recordings]
-    magnitudes = measure_magnitudes(structure, records, CELLS)
+    magnitudes = measure_magnitudes(structure, records)
     model, common = fit_given(magnitudes, records, ()), common_effects(structure, EFFECTS)
     best, *_ = candidate_fits.fit_candidates(magnitudes, common, model, thorough=True)
     assert best.addition.key == ("yielding", "cab_engine")

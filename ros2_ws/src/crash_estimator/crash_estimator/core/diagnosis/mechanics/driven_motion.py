@@ -8,8 +8,7 @@ import numpy as np
 from ...effects.effect import Addition
 from ..observation.record import ObservedRecord
 from ..observation.trajectory import Trajectory, integrate
-from ..parameterization.experiment import Experiment
-from ..parameterization.layout import FREE, Layout
+from ..parameterization.layout import FREE, Experiment, Layout
 from ..parameterization.magnitudes import attached_start
 
 

@@ -11,8 +11,7 @@ from crash_replay.conditioning import cfc_filter
 from ..observation.noise_inflation import CFC, SLOWEST
 from ..observation.record import ObservedRecord
 from ..observation.trajectory import Trajectory
-from ..parameterization.experiment import Experiment
-from ..parameterization.layout import Layout
+from ..parameterization.layout import Experiment, Layout
 from ..parameterization.terms import Term
 from .driven_motion import measured_motion
 

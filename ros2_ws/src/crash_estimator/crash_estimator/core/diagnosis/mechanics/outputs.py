@@ -7,8 +7,7 @@ import numpy as np
 
 from ..observation.record import Output
 from ..observation.trajectory import Trajectory
-from ..parameterization.experiment import Experiment
-from ..parameterization.layout import Layout
+from ..parameterization.layout import Experiment, Layout
 from .driven_motion import Distortion, distortion
 from .linear_system import Sampling
 from .masses import masses

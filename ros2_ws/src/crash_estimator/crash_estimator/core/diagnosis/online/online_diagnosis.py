@@ -24,13 +24,12 @@ from ..observation.rest import Quiet, quiet_of, rest_of, rests_of
 from ..output_error.gauss_newton import fit
 from ..output_error.problem import make_problem
 from ..parameterization.layout import Layout
-from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
+from ..parameterization.magnitudes import CELLS, Magnitudes, measure_magnitudes
 from ..parameterization.model_terms import additions_of
 from ..report.ranking import ranking_of
 from ..report.verdict import ADEQUATE, EFFECT_MISSING, UNEXPLAINED
 from ..residuals.misfit_windows import misfit_windows
 from ..residuals.residuals import Residuals, analyse, noise_floor, rms
-from ..selection.assumptions import CELLS
 from ..selection.fitted_model import Model
 from ..selection.rare_effects import common_effects
 from ..selection.selection_step import SelectionStep
@@ -77,7 +76,7 @@ class OnlineDiagnosis:
         magnitudes = measure_magnitudes(
             self.structure, records, min(CELLS, CELLS_IN_ALL // len(self.structure.elements))
         )
-        given = _model(state, records, magnitudes, additions_of(self.structure, magnitudes, self.effects))
+        given = _model(state, records, magnitudes, additions_of(magnitudes, self.effects))
         if given is None:
             return state, None
         state, tried = try_some(state, magnitudes, common_effects(self.structure, self.effects), given, out_of_time)

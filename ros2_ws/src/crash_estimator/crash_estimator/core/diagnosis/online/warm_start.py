@@ -10,9 +10,8 @@ from ..mechanics.driven_motion import measured_motion, motion_of
 from ..observation.trajectory import Trajectory
 from ..output_error.gauss_newton import Fit
 from ..output_error.problem import OutputErrorProblem, Point
-from ..parameterization.experiment import Experiment
 from ..parameterization.free_curve import value
-from ..parameterization.layout import FREE, Layout
+from ..parameterization.layout import FREE, Experiment, Layout
 
 
 def carried_on(last: Fit, problem: OutputErrorProblem) -> Point:

@@ -8,6 +8,7 @@ parameters.
 """
 
 from collections.abc import Sequence
+from contextvars import ContextVar
 from typing import NamedTuple
 
 import numpy as np
@@ -16,10 +17,8 @@ from scipy.linalg import LinAlgError, cho_solve
 from ..mechanics.driven_motion import motion_of
 from ..mechanics.linearization import Equations
 from ..observation.trajectory import Trajectory
-from ..parameterization.experiment import Experiment
-from ..parameterization.layout import Layout
+from ..parameterization.layout import Experiment, Layout
 from .continuation import FREE_RUN, FROM_MEASURED_MOTION, Schedule
-from .effort import count_iteration
 from .laplace_evidence import cholesky, log_prior, posterior
 from .normal_equations import Normal, equation_error, may_diverge, normal_equations
 from .problem import OutputErrorProblem, Point
@@ -43,6 +42,8 @@ COARSE = 1e-3
 CIRCLES = 4
 """Iterations in which the cost finds no new least by as much: it goes around a kink of the forces. With five, one of a
 bag's two unloading lines was told as hysteresis."""
+
+_made: ContextVar[int] = ContextVar("iterations", default=0)
 
 
 class Step(NamedTuple):
@@ -74,6 +75,12 @@ class Fit(NamedTuple):
     @property
     def point(self) -> Point:
         return Point(self.theta, self.trajectories)
+
+
+def iterations_made() -> int:
+    """Of all fits so far, each a pass over all recordings: work that is the same on every machine, and grows with the
+    samples as its time does."""
+    return _made.get()
 
 
 @may_diverge
@@ -162,7 +169,7 @@ def fit(
     halvings, last, iteration, circles = 0, np.inf, 0, 0
     while True:
         iteration += 1
-        count_iteration()
+        _made.set(iterations_made() + 1)
         stage = stages.pop(0) if stages else FREE_RUN
         try:
             # a shape constant fitted to a motion that is still wrong goes astray

@@ -13,8 +13,7 @@ from ..mechanics.outputs import by_channel_errors, output_noise, predicted
 from ..observation.grid import binned
 from ..observation.record import ObservedRecord
 from ..observation.trajectory import Trajectory
-from ..parameterization.experiment import Experiment
-from ..parameterization.layout import FREE
+from ..parameterization.layout import FREE, Experiment
 from .continuation import FREE_RUN, Stage
 from .problem import OutputErrorProblem, Point
 from .sensitivity_equations import propagate

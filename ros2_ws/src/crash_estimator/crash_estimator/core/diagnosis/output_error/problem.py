@@ -9,8 +9,7 @@ from ...effects.effect import Addition
 from ..mechanics.driven_motion import measured_motion, motion_of
 from ..observation.record import ObservedRecord
 from ..observation.trajectory import Trajectory
-from ..parameterization.experiment import Experiment, experiments_of
-from ..parameterization.layout import Layout, make_layout
+from ..parameterization.layout import Experiment, Layout, experiments_of, make_layout
 from ..parameterization.magnitudes import Magnitudes
 
 
@@ -90,7 +89,7 @@ def make_problem(
     roughness: Mapping[str, np.ndarray] | None = None,
 ) -> OutputErrorProblem:  # fmt: skip
     """A structure with additions on records; roughness: of its curves, where it is not the usual one."""
-    layout = make_layout(magnitudes.structure, records, magnitudes, additions, roughness)
+    layout = make_layout(records, magnitudes, additions, roughness)
     return OutputErrorProblem(layout, experiments_of(layout, records))
 
 

@@ -1,7 +1,8 @@
 """What is fitted: the parameters of a structure with its effects on some recordings, their priors and limits.
 
-Parameters stand in this order: forces at the curves' knots, then constants of elements and effects, then for each
-recording the nuisances (errors and drifts of its outputs' zeros, slow errors of its driven motions).
+Parameters stand in this order: forces at the curves' knots, then constants of elements and effects and errors of the
+masses, then for each recording the nuisances (errors and drifts of its outputs' zeros, slow errors of its driven
+motions, errors of the velocities that it starts with).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -79,12 +80,27 @@ class Layout(NamedTuple):
         return next(term for term in self.terms if term.addition.key == addition.key)
 
 
+class Experiment(NamedTuple):
+    """A recording under a layout: what the mechanics and the fit go through one after the other."""
+
+    layout: Layout
+    record: ObservedRecord
+    index: int  # type: ignore[assignment]  # among the layout's recordings; hides the tuple's own method
+
+
+def experiments_of(layout: Layout, records: Sequence[ObservedRecord]) -> tuple[Experiment, ...]:
+    """Raises ValueError where the layout was made for another number of recordings."""
+    if len(records) != len(layout.offsets):
+        raise ValueError(f"a layout of {len(layout.offsets)} recordings, got {len(records)}")
+    return tuple(Experiment(layout, record, index) for index, record in enumerate(records))
+
+
 def make_layout(
-    structure: Structure, records: Sequence[ObservedRecord], magnitudes: Magnitudes, additions: Sequence[Addition],
+    records: Sequence[ObservedRecord], magnitudes: Magnitudes, additions: Sequence[Addition],
     roughness: Mapping[str, np.ndarray] | None = None,
 ) -> Layout:  # fmt: skip
     """roughness: of curves, by their link's name, where it is not the usual one (`free_curve.adapted_roughness`)."""
-    roughness = roughness or {}
+    structure, roughness = magnitudes.structure, roughness or {}
     b = Builder()
     bodies, kind = zip(*_bodies(structure, additions), strict=True)
     index = {name: k for k, name in reversed(list(enumerate(bodies)))}

@@ -15,6 +15,9 @@ from ..observation.record import ObservedRecord, outputs_of
 from ..observation.trajectory import Trajectory, element_motion, integrate, measured_trajectory
 from .free_curve import make_knots
 
+CELLS = 36
+"""Of a free curve over its crush scale: 1 cm of a crush of 0.4 m, the length of a fold of a longitudinal."""
+
 SHORTEST_CRUSH = 0.03
 SHORTEST_SHARE = 0.15
 """An element that is hardly crushed gets this crush scale (m, or share of the largest crush in the structure, if that
@@ -122,8 +125,11 @@ def attached_start(structure: Structure, record: ObservedRecord, addition) -> tu
 
 
 def measure_magnitudes(
-    structure: Structure, records: Sequence[ObservedRecord], cells: int, motions: Sequence[Trajectory] | None = None,
-) -> Magnitudes:  # fmt: skip
+    structure: Structure,
+    records: Sequence[ObservedRecord],
+    cells: int = CELLS,
+    motions: Sequence[Trajectory] | None = None,
+) -> Magnitudes:
     """motions: where the measured accelerations are known to err, a better idea of how the bodies move."""
     measured = tuple(motions or (measured_trajectory(structure, record) for record in records))
     outputs = outputs_of(structure)

@@ -4,18 +4,17 @@ from collections.abc import Mapping
 
 from ...effects.effect import Addition, Effect
 from ...effects.targets import checked
-from ...structure import EffectSpec, Structure
+from ...structure import EffectSpec
 from .magnitudes import Magnitudes
 
 
-def additions_of(structure: Structure, magnitudes: Magnitudes, effects: Mapping[str, Effect]) -> tuple[Addition, ...]:
+def additions_of(magnitudes: Magnitudes, effects: Mapping[str, Effect]) -> tuple[Addition, ...]:
     """Raises ModelError where a model names an effect or a target that there is not."""
-    return tuple(_addition(structure, magnitudes, spec, effects) for spec in structure.effects)
+    return tuple(_addition(magnitudes, spec, effects) for spec in magnitudes.structure.effects)
 
 
-def _addition(
-    structure: Structure, magnitudes: Magnitudes, spec: EffectSpec, effects: Mapping[str, Effect]
-) -> Addition:
+def _addition(magnitudes: Magnitudes, spec: EffectSpec, effects: Mapping[str, Effect]) -> Addition:
+    structure = magnitudes.structure
     effect = checked(structure, spec, effects, magnitudes.records[0].test)
     shapes = {
         name: shape.starts[len(shape.starts) // 2] * magnitudes.shape_unit(shape, spec.target)

@@ -15,7 +15,6 @@ from ..observation.record import observe
 from ..output_error.problem import make_problem
 from ..output_error.simulation import simulate
 from ..parameterization.magnitudes import measure_magnitudes
-from ..selection.assumptions import CELLS
 from .diagnosis import Diagnosis
 
 
@@ -39,7 +38,7 @@ def predict(found: Diagnosis, recording: Recording) -> Predicted:
     layout = fitted.layout
     record = observe(layout.structure, with_accelerations(_as_given(layout.structure), [recording])[1][0])
     additions = [term.addition for term in layout.terms]
-    magnitudes = measure_magnitudes(layout.structure, [record], CELLS)
+    magnitudes = measure_magnitudes(layout.structure, [record])
     problem = make_problem(magnitudes, [record], additions)
     outputs = np.arange(len(layout.outputs))
     theta = problem.layout.start.copy()

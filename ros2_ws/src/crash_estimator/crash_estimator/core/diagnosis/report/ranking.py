@@ -9,7 +9,7 @@ from crash_replay.conditioning import cfc_filter
 from ..mechanics.masses import balance_of
 from ..observation.noise_inflation import CFC, SLOWEST
 from ..output_error.gauss_newton import Fit
-from ..parameterization.experiment import Experiment
+from ..parameterization.layout import Experiment
 from ..parameterization.terms import Term
 from ..residuals.residuals import analyse, noise_floor
 from ..selection.candidate_fits import CandidateFit, odds_against

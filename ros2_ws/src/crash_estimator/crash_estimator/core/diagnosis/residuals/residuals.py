@@ -14,8 +14,7 @@ from ..output_error.gauss_newton import Fit
 from ..output_error.normal_equations import may_diverge, whitened
 from ..output_error.problem import OutputErrorProblem, Point
 from ..output_error.simulation import simulate
-from ..parameterization.experiment import Experiment
-from ..parameterization.layout import Layout
+from ..parameterization.layout import Experiment, Layout
 from .band_test import Absorbed, BandTest, band_test, band_test_of_fit
 
 UNBOUNDED = 1e3

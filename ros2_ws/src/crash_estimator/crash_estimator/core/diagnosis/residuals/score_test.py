@@ -25,8 +25,7 @@ from ..observation.grid import binned
 from ..observation.trajectory import Trajectory
 from ..output_error.gauss_newton import Fit, solve
 from ..output_error.normal_equations import Normal, may_diverge, whitened
-from ..parameterization.experiment import Experiment
-from ..parameterization.layout import FREE
+from ..parameterization.layout import FREE, Experiment
 
 MODES = 6
 """Of time: the last one's half period is a sixth of the record, what rises faster shows in the bands of `band_test`."""

@@ -15,7 +15,7 @@ from ...structure import Structure
 from ..observation.record import ObservedRecord
 from ..output_error.gauss_newton import Fit, fit
 from ..output_error.problem import make_problem
-from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
+from ..parameterization.magnitudes import CELLS, Magnitudes, measure_magnitudes
 from ..parameterization.model_terms import additions_of
 from ..residuals.residuals import Residuals, analyse
 from ..residuals.score_test import drift_of
@@ -29,9 +29,6 @@ from .rare_effects import found_as_common
 from .search_limit import search_is_over
 from .selection_step import SelectionStep, as_found, sized_models
 from .thresholds import THRESHOLDS
-
-CELLS = 36
-"""Of a free curve over its crush scale: 1 cm of a crush of 0.4 m, the length of a fold of a longitudinal."""
 
 FINER_CELLS = 2 * CELLS
 """Cells of half the width, where what is left may be folds that those are too wide for."""
@@ -195,8 +192,8 @@ def _as_exact_as_needed(
 def _as_given(
     structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]
 ) -> tuple[Magnitudes, Model]:
-    magnitudes = measure_magnitudes(structure, records, CELLS)
-    return magnitudes, fit_given(magnitudes, records, additions_of(structure, magnitudes, effects))
+    magnitudes = measure_magnitudes(structure, records)
+    return magnitudes, fit_given(magnitudes, records, additions_of(magnitudes, effects))
 
 
 def _in_doubt(doubted: Magnitudes, model: Model) -> Model:

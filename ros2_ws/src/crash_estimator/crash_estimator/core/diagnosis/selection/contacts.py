@@ -8,7 +8,7 @@ from ...structure import Structure
 from ...structure_parts import ALL, SPRINGS
 from ..mechanics.linearization import linearise
 from ..output_error.gauss_newton import Fit
-from ..parameterization.experiment import experiments_of
+from ..parameterization.layout import experiments_of
 
 
 def never_pulling(structure: Structure) -> Structure:

@@ -18,7 +18,7 @@ from ..output_error.problem import make_problem
 from ..parameterization.magnitudes import measure_magnitudes
 from ..residuals.residuals import Residuals, analyse
 from .acceptance import share_removed
-from .assumptions import CELLS, SelectionPath, first_believed, select
+from .assumptions import SelectionPath, first_believed, select
 from .candidates import candidates
 from .fitted_model import Model, fit_model
 from .rare_effects import common_effects
@@ -122,7 +122,7 @@ class _Search:
         if path.noise or not elsewhere:
             return ()
         records = self._observed(begins)
-        magnitudes = measure_magnitudes(path.structure, records, CELLS)
+        magnitudes = measure_magnitudes(path.structure, records)
         there = fit_model(magnitudes, records, path.final.additions).residuals
         least = THRESHOLDS.all_but_folds if _leaves_far_more(path) else 0.0
         return begins if share_removed(_left_by(path), there) > least else ()
@@ -157,7 +157,7 @@ class _Search:
         fitted = (one.addition for one in path.steps[0].as_recorded if one.fit)
         element = next((one.target for one in fitted if one.effect.acts_on == "element"), None)
         records, present = self._observed(begins), path.final.additions[: path.present]
-        magnitudes = measure_magnitudes(path.structure, records, CELLS)
+        magnitudes = measure_magnitudes(path.structure, records)
         laws: dict[tuple[str, str], Addition] = {}
         for one in candidates(magnitudes, self.effects, present):
             if one.target == element:

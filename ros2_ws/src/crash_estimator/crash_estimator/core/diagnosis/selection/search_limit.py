@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from time import monotonic
 
-from ..output_error.effort import iterations_made
+from ..output_error.gauss_newton import iterations_made
 
 LONGEST_SEARCH = 4000
 """Gauss-Newton iterations of a search for which no time is stated: 10 s for two recordings of a dummy. Of 299 looked-at

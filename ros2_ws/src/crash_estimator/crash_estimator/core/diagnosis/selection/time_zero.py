@@ -27,7 +27,6 @@ from ..output_error.problem import make_problem
 from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
 from ..parameterization.model_terms import additions_of
 from ..residuals.residuals import Residuals, analyse, rms
-from .assumptions import CELLS
 from .fitted_model import Model, fit_given, fit_model
 from .search_limit import search_is_over
 from .thresholds import THRESHOLDS
@@ -122,8 +121,8 @@ def time_zero_wrong(
     """None where the model as given leaves noise only, or hardly less of the moved recordings."""
 
     def given(records: Sequence[ObservedRecord]) -> Model:
-        magnitudes = measure_magnitudes(structure, records, CELLS)
-        return fit_given(magnitudes, records, additions_of(structure, magnitudes, effects))
+        magnitudes = measure_magnitudes(structure, records)
+        return fit_given(magnitudes, records, additions_of(magnitudes, effects))
 
     zero = TimeZero(shifts, given(stated))
     return zero if not zero.as_stated.white and zero.gain(given(moved)) > THRESHOLDS.gain else None
@@ -203,7 +202,7 @@ class MotionStart:
             records = self.observed(shifts)
         except ModelError:  # too little is left from there on
             return _Nothing()
-        return left_by(measure_magnitudes(self.structure, records, CELLS), records, self.additions)
+        return left_by(measure_magnitudes(self.structure, records), records, self.additions)
 
     def about(self, taken: tuple[Shift, ...]) -> tuple[Shift, ...]:
         """Within the first step."""
