@@ -75,7 +75,7 @@ def linearise(
     """
     layout, record, r = experiment
     mass = masses(layout, theta)
-    measured = np.array([_measured(layout, body) for body in range(len(layout.bodies))], dtype=float)
+    measured = np.isin(np.arange(len(layout.bodies)), [output.body for output in layout.outputs if output.fixed])
     inverse = np.where(layout.kind == FREE, 1.0 / mass, measured)
     driven = layout.kind == DRIVEN
     inverse[driven] = 0.0
@@ -199,10 +199,6 @@ def _acting(link: Link, theta: np.ndarray) -> Link:
 def _steps(record: ObservedRecord) -> np.ndarray:
     """(g,) length of the step that an instant stands for."""
     return np.maximum(record.dt, record.dt[1])
-
-
-def _measured(layout: Layout, body: int) -> bool:
-    return any(output.body == body and output.fixed for output in layout.outputs)
 
 
 def _crush_and_rate(link: Link, experiment: Experiment, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:

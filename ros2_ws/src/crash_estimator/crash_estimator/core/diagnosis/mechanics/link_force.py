@@ -91,7 +91,8 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
         more, steeper = (sum(each) for each in zip(*((one.force, one.slope) for one in inside), strict=True))
         found = Spring(*spring(law, crush, rate, dt, more, steeper))
     x, peak, on_line, at = found.x, found.peak, found.on_line, found.at
-    static, kx, kp, weight, carries = found.static, found.kx, found.kp, found.weight, found.carries
+    static, kx, carries = found.static, found.kx, found.carries
+    kp, weight = found.kp * carries, found.weight * carries[:, None]
     factor = np.ones_like(x)
     kv, force = np.zeros_like(x), static
     if link.factors:
@@ -146,7 +147,7 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
         if law.unloads:
             # on the unloading line it is the spring's force that opens the contact: what changes it, moves the instant
             opens = np.where(on_line, found.gate_slope * contact.force / max(law.slope, 1.0), 0.0)
-            weight, kp = weight + opens[:, None] * found.weight_line, kp + opens * found.kp_line
+            weight, kp = weight + opens[:, None] * found.weight, kp + opens * found.kp
             moved = {link.constant: at} | {p: column for one in inside for p, column in zip(*one[2:], strict=True)}
             columns = [c + opens * moved.get(p, 0.0) for p, c in zip(parameters, columns, strict=True)]
     side = np.sign(crush) if law.play else 1.0

@@ -40,19 +40,14 @@ def output_noise(experiment: Experiment, theta: np.ndarray, samples: int = 1) ->
         for q, output in enumerate(layout.outputs):
             if output.body != host:
                 continue
-            delay, parameter = _delay(layout, theta, output.channel)
-            f = delay / record.period % 1.0
+            d = distortion(layout, theta, output.channel)
+            f = d.delay / record.period % 1.0
             smoothed = 1.0 - 2.0 * f * (1.0 - f) / samples
             variance[q] += (share * sigma) ** 2 * smoothed
             growth.append((q, term.coefficient, share * slope * sigma**2 * smoothed))
-            if parameter >= 0:
-                growth.append((q, parameter, (share * sigma) ** 2 * (2.0 * f - 1.0) / (samples * record.period)))
+            if d.by_delay >= 0:
+                growth.append((q, d.by_delay, (share * sigma) ** 2 * (2.0 * f - 1.0) / (samples * record.period)))
     return Noise(np.sqrt(variance), [(q, p, g / variance[q]) for q, p, g in growth])
-
-
-def _delay(layout: Layout, theta: np.ndarray, channel: str) -> tuple[float, int]:
-    found = distortion(layout, theta, channel)
-    return found.delay, found.by_delay
 
 
 def sampling(experiment: Experiment, theta: np.ndarray) -> tuple[Sampling, list[int]]:

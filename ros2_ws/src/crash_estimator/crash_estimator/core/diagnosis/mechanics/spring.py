@@ -39,11 +39,9 @@ class Spring(NamedTuple):
     at: np.ndarray  # (g,) m, where on the curve the force is read
     static: np.ndarray  # (g,) N, 0 where it does not carry
     kx: np.ndarray  # (g,) N/m, by the crush
-    kp: np.ndarray  # (g,) N/m, by the peak, likewise 0
-    kp_line: np.ndarray  # (g,) N/m, by the peak, also where it does not carry
+    kp: np.ndarray  # (g,) N/m, by the peak, also where it does not carry
     knot: np.ndarray  # (g, 2) parameters in use, -1: none
-    weight: np.ndarray  # (g, 2), by those, 0 where it does not carry
-    weight_line: np.ndarray  # (g, 2), by those, also where it does not carry
+    weight: np.ndarray  # (g, 2), by those, also where it does not carry
     carries: np.ndarray  # (g,) 1 or 0
     gate: np.ndarray  # (g,) share of the time step in which it is in contact
     gate_slope: np.ndarray  # (g,) 1/m
@@ -53,16 +51,16 @@ class Spring(NamedTuple):
 
 @njit(cache=True, error_model="numpy")
 def spring(law, crush, rate, dt, more, more_slope):
-    """The equations of `linkforce` for crush (g,) m, rate (g,) m/s and the length of each step dt (g,) s.
+    """The equations of `link_force` for crush (g,) m, rate (g,) m/s and the length of each step dt (g,) s.
 
     more, more_slope: (g,) N and N/m by which the curve is higher and steeper where it is read; or empty.
     """
     gap, play, unloads, slope, knots, forces, columns, stiffness, one_way = law
     g, last = len(crush), len(knots) - 2
     x, peak, at, static = np.empty(g), np.empty(g), np.empty(g), np.empty(g)
-    kx, kp, kp_line = np.empty(g), np.empty(g), np.empty(g)
+    kx, kp = np.empty(g), np.empty(g)
     loading, on_line = np.empty(g, np.bool_), np.empty(g, np.bool_)
-    knot, weight, weight_line = np.full((g, 2), -1), np.zeros((g, 2)), np.zeros((g, 2))
+    knot, weight = np.full((g, 2), -1), np.zeros((g, 2))
     carries, gate, gate_slope = np.ones(g), np.ones(g), np.zeros(g)
     crushed, crushed_slope = np.ones(g), np.zeros(g)
     highest, cell = 0.0, 0
@@ -83,17 +81,17 @@ def spring(law, crush, rate, dt, more, more_slope):
             k = (forces[cell + 1] - forces[cell]) / width
             static[t] = forces[cell] + right * (forces[cell + 1] - forces[cell])
             knot[t, 0], knot[t, 1] = columns[cell], columns[cell + 1]
-            weight_line[t, 0], weight_line[t, 1] = 1.0 - right, right
+            weight[t, 0], weight[t, 1] = 1.0 - right, right
         else:
             k = stiffness
             static[t] = k * at[t]
         if len(more):
             static[t] += more[t]
             k += more_slope[t]
-        kx[t], kp_line[t] = k, 0.0
+        kx[t], kp[t] = k, 0.0
         if on_line[t]:
             static[t] -= slope * (highest - x[t])
-            kx[t], kp_line[t] = slope, k - slope
+            kx[t], kp[t] = slope, k - slope
         if one_way:
             margin = x[t]
             spent = on_line[t] and static[t] <= 0.0
@@ -109,16 +107,12 @@ def spring(law, crush, rate, dt, more, more_slope):
             gate[t], gate_slope[t] = _opened(margin, width)
             gate_slope[t] = np.sign(crush[t]) * gate_slope[t]
             crushed[t], crushed_slope[t] = gate[t], gate_slope[t]
-        open_ = carries[t]
-        static[t] *= open_
-        kx[t] *= open_
-        kp[t] = kp_line[t] * open_
-        weight[t, 0], weight[t, 1] = weight_line[t, 0] * open_, weight_line[t, 1] * open_
+        static[t] *= carries[t]
+        kx[t] *= carries[t]
     if one_way and x[0] >= 0.0 and rate[0] > 0.0:
         gate[0] = crushed[0] = 1.0  # touching at time zero: it carries from then on
     return (
-        x, peak, loading, on_line, at, static, kx, kp, kp_line, knot, weight, weight_line, carries, gate, gate_slope,
-        crushed, crushed_slope,
+        x, peak, loading, on_line, at, static, kx, kp, knot, weight, carries, gate, gate_slope, crushed, crushed_slope,
     )  # fmt: skip
 
 

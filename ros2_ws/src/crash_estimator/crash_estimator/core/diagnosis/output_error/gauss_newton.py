@@ -66,7 +66,6 @@ class Fit(NamedTuple):
     trajectories: tuple[Trajectory, ...]
     cost: float  # 2 x negative logarithm of the posterior at its maximum, less constants common to all models
     evidence: float  # nats: logarithm of the marginal likelihood, less constants common to all models
-    iterations: int
 
     @property
     def layout(self) -> Layout:
@@ -186,7 +185,7 @@ def fit(
             point = _half_way_back(problem, last_good[0], point)
             continue
         if step is None:
-            return _failed(problem, point, iteration)
+            return _failed(problem, point)
         last_good = (point, step) if stage == FREE_RUN else None
         halvings = 0
         enough = max(CONVERGED, COARSE * (step.after - 1.3 * normal.samples))
@@ -213,15 +212,15 @@ def fit(
     try:
         covariance, log_determinant = posterior(normal.matrix + layout.prior.precision)
     except LinAlgError:
-        return _failed(problem, point, iteration)
+        return _failed(problem, point)
     evidence = -0.5 * cost - 0.5 * log_determinant + 0.5 * log_prior(layout)
-    return Fit(problem, point.theta, covariance, tuple(point.trajectories), cost, evidence, iteration)
+    return Fit(problem, point.theta, covariance, tuple(point.trajectories), cost, evidence)
 
 
-def _failed(problem: OutputErrorProblem, point: Point, iteration: int) -> Fit:
+def _failed(problem: OutputErrorProblem, point: Point) -> Fit:
     """A simulation that diverges, whatever is tried: infinitely unlikely."""
     unknown = np.full_like(problem.layout.prior.precision, np.nan)
-    return Fit(problem, point.theta, unknown, tuple(point.trajectories), np.inf, -np.inf, iteration)
+    return Fit(problem, point.theta, unknown, tuple(point.trajectories), np.inf, -np.inf)
 
 
 def _shorten(delta: np.ndarray, shapes: np.ndarray) -> float:

@@ -21,12 +21,9 @@ STEP = 0.5
 PRECISION = 1e-3
 """Of the logarithm."""
 
-LEAST = 1e-9
-"""Of a constant, in its unit: of a gap, nothing."""
-
 
 class Profile(NamedTuple):
-    """A coarse look at the profile over the coefficient of an addition, which is positive."""
+    """A coarse look at the profile over the coefficient of an addition, which has a lower limit above zero."""
 
     addition: Addition
     problem: OutputErrorProblem
@@ -48,7 +45,7 @@ def profile(problem: OutputErrorProblem, addition: Addition, starts: Sequence[fl
         tried[logarithm] = fit(problem.starting_at(start), schedule=SMALL_STEPS, held=(coefficient,))
         return tried[logarithm].cost
 
-    lowest = np.log(max(layout.prior.low[coefficient], LEAST))
+    lowest = np.log(layout.prior.low[coefficient])
     low, high = max(np.log(min(starts)) - STEP, lowest), np.log(max(starts)) + STEP
     best = min(np.linspace(low, high, 1 + int(np.ceil((high - low) / STEP))), key=cost)
     while best == max(tried) and cost(best + STEP) < tried[best].cost:

@@ -31,7 +31,7 @@ def _whole(columns):
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def propagate(system, sampling, out):
-    """Fill out (bins, q, columns); system: a `linear.Linear`, sampling: a `linear.Sampling`."""
+    """Fill out (bins, q, columns); system: a `linear_system.Linear`, sampling: its `Sampling`."""
     steps, ends, crush_ends, inverse_mass, kind, kx, kv, kp, loading, knot, weight = system[:11]
     changed, start, observer, others, column, body, acts, remembers, kept, by_crush, by_before, recalled = system[11:23]
     touched = system[23]

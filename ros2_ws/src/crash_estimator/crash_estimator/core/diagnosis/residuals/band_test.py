@@ -105,7 +105,12 @@ def probability_of(freedom: float, samples: float, ratio: float) -> float:
     return float(fdtrc(freedom, min(float(samples), 1e6), ratio))
 
 
+def of_any(least: float, tests: int) -> float:
+    """Probability that any of so many independent tests gives one as low as the least (Sidak 1967)."""
+    return float(-np.expm1(tests * np.log1p(-min(least, 1.0 - 1e-12))))
+
+
 def _worst_of(found: Sequence[tuple[float, Band]]) -> BandTest:
     least = min(found, key=lambda one: one[0], default=(1.0, Band(0, 0, 0.0, 0.0, 0.0)))
-    probability = float(-np.expm1(len(found) * np.log1p(-min(least[0], 1.0 - 1e-12))))
+    probability = of_any(least[0], len(found))
     return BandTest(probability > SIGNIFICANT, probability, least[1])

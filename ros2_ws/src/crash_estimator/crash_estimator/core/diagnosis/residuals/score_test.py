@@ -26,6 +26,7 @@ from ..observation.trajectory import Trajectory
 from ..output_error.gauss_newton import Fit, solve
 from ..output_error.normal_equations import Normal, may_diverge, whitened
 from ..parameterization.layout import FREE, Experiment
+from .band_test import of_any
 
 MODES = 6
 """Of time: the last one's half period is a sixth of the record, what rises faster shows in the bands of `band_test`."""
@@ -72,7 +73,7 @@ def drift_of(fitted: Fit) -> Drift:
     found = [(*_statistic(score[b], information[b, b]), name) for b, name in zip(blocks, names)]
     square, freedom, _ = max(found)
     least = min(float(chdtrc(f, s)) for s, f, _ in found)
-    probability = float(-np.expm1(len(found) * np.log1p(-min(least, 1.0 - 1e-12))))
+    probability = of_any(least, len(found))
     alike = [name for s, _, name in sorted(found, reverse=True) if s > square - TOLD_APART][:MOST_NAMED]
     share = (square - freedom) / max(normal.cost - normal.samples, 1.0)
     return Drift(probability > SIGNIFICANT, probability, " or ".join(alike), float(np.clip(share, 0.0, 1.0)))
