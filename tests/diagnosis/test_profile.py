@@ -32,7 +32,9 @@ def drawn(structure: str, seed: int, noise: float):
 def test_the_look_at_a_profile_goes_on_beyond_the_largest_start_as_long_as_the_cost_falls(monkeypatch, least):
     """The cost is a V over the logarithm, its point at or beyond that of the one start."""
     layout = SimpleNamespace(
-        start=np.ones(1), prior=SimpleNamespace(low=np.full(1, 0.1)), term=lambda addition: SimpleNamespace(coefficient=0)
+        start=np.ones(1),
+        prior=SimpleNamespace(low=np.full(1, 0.1)),
+        term=lambda addition: SimpleNamespace(coefficient=0),
     )
     problem = SimpleNamespace(layout=layout, starting_at=lambda start: start)
     monkeypatch.setattr(

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..observation.record import ObservedRecord
 from ..observation.trajectory import Trajectory, measured_crush
-from ..parameterization.layout import DRIVEN, FREE, Experiment, Layout
+from ..parameterization.layout import DRIVEN, FREE, Experiment
 from ..parameterization.terms import Link
 from .driven_motion import driven_by, start_by
 from .linear_system import Linear, Sampling, ranked

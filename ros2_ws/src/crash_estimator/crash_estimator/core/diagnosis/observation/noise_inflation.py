@@ -12,20 +12,22 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.fft import dct
 
+from crash_replay.conditioning import RATE_PER_CFC
+
 from .grid import binned, bins_of
 from .record import ObservedRecord
 
 CFC = 60
 """The band in which forces and inertias of a structure that rings are compared (SAE J211: its motion as a whole)."""
 
-SLOWEST = 10.0 * CFC
+SLOWEST = RATE_PER_CFC * CFC
 """Samples in a second that the filter needs."""
 
 BIN = 4e-3
 """s: means over it keep what is below 125 Hz; CFC 60 is 3 dB down at 100 Hz."""
 
-EDGES = (0.0, 30.0, 60.0, 125.0)
-"""Hz: two halves of the band of `CFC`, and what its filter still passes above."""
+EDGES = (0.0, CFC / 2.0, CFC, 0.5 / BIN)
+"""Hz: two halves of the band of `CFC`, and what its filter still passes above, up to what the bins keep."""
 
 
 def with_inflated_noise(

@@ -9,7 +9,7 @@ from crash_replay.recording import Recording
 from ...structure import Structure
 
 LONGEST_STEP = 1.5e-4
-"""s: the linear-acceleration step's phase error is (omega dt)^2 / 24: 2e-5 for the stiffest contact, 200 rad/s."""
+"""s: the linear-acceleration step's phase error is (omega dt)^2 / 24: 3.75e-5 for the stiffest contact, 200 rad/s."""
 
 LONG = 1.0
 """s: no crash lasts as long. A longer record is of something slower, or oscillates: its steps are as short as its own

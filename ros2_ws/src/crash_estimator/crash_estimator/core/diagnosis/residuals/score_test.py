@@ -40,9 +40,8 @@ TOLD = 0.01
 """Share of a direction that the model's parameters must leave: the little that they leave of others, a curve's prior
 decides, which is no more than a good guess."""
 
-
 TOLD_APART = 12.0
-"""Difference of u' S^-1 u: six nats, as of candidates."""
+"""Difference of u' S^-1 u: six nats, as much as a candidate gains that counts as found (`Thresholds.gain`)."""
 
 MOST_NAMED = 3
 """Things that may vary and are named: the line says where to look, and more is no hint."""
