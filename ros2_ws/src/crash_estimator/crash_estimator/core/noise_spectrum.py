@@ -94,6 +94,8 @@ class NoiseSpectrum(NamedTuple):
     def density(self, frequency: np.ndarray, means_over: int = 1) -> np.ndarray:
         """Relative to that of white noise of `std`, at frequencies in Hz; means_over: of means over so many samples
         each, which show what is faster than they are at a lower frequency, too."""
+        if not self.coefficients:  # all of them white, whatever the period is
+            return np.ones(len(frequency))
         found, rate = np.zeros(len(frequency)), 1.0 / (means_over * self.period)
         for k in range(means_over):
             f = frequency + k * rate
