@@ -6,11 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers_diagnosis import hidden_case, so_far
-from helpers_estimation import oscillator, oscillator_recording
 from numpy.testing import assert_allclose, assert_array_equal
 
-from crash_estimator.core.diagnosis.observation.bin_means import MOST_STEPS, in_bins
-from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.online import candidate_turns, online_diagnosis
 from crash_estimator.core.diagnosis.online.candidate_turns import ITERATIONS_ON
 from crash_estimator.core.diagnosis.online.online_answer import OnlineAnswer, final_answer
@@ -203,28 +200,6 @@ def test_too_few_samples_say_nothing_and_a_model_without_its_channel_is_refused(
     other = hidden_case("side", "", 8120)[2]
     with pytest.raises(RecordingError, match="has no channel"):
         OnlineDiagnosis(model, other.test)
-
-
-def test_a_coarse_record_keeps_the_means_and_the_noise_of_a_mean():
-    _, model, recording = hidden_case("side", "", 8120)
-    record = observe(model, recording)
-    coarse = in_bins(record)
-    count = len(coarse.at)
-    per_bin = round(record.noise[0] ** 2 / coarse.noise[0] ** 2)
-    # a whole number of samples in a bin
-    assert per_bin > 1 and len(record.at) / (per_bin + 0.5) <= MOST_STEPS
-    used = record.measured[-count * per_bin :]
-    assert_allclose(coarse.measured, used.reshape(count, per_bin, -1).mean(axis=1))
-    assert_allclose(coarse.time[coarse.at][-1], record.time[record.at][-per_bin:].mean())
-
-
-def test_bins_are_as_long_as_a_record_asks_for_up_to_its_very_last_sample():
-    """40 ms at 10 kHz, the last sample 120 ms after those: 1 ms each, not the half that they would be without it."""
-    whole = oscillator_recording(n=401)
-    time_ns = whole.time_ns.copy()
-    time_ns[-1] += 120_000_000
-    record = observe(oscillator(), Recording(whole.test, time_ns, whole.values))
-    assert round(record.noise[0] ** 2 / in_bins(record).noise[0] ** 2) == 10
 
 
 def test_a_pass_that_begins_again_knows_nothing_of_later_samples(damped):

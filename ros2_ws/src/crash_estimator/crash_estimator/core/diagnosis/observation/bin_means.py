@@ -25,21 +25,21 @@ def in_bins(record: ObservedRecord) -> ObservedRecord:
     used = bins * per_bin  # the last samples: what is new must be seen, what is left over is at the impact
     centre = time[-used:].reshape(bins, per_bin).mean(axis=1)
     measured = record.measured[-used:].reshape(bins, per_bin, -1)
-    valid = np.isfinite(measured)
-    count = valid.sum(axis=1)
-    mean = np.where(valid, measured, 0.0).sum(axis=1) / np.where(count, count, np.nan)
-    bin_ = np.concatenate([[-1], np.arange(bins)])
+    compared = record.valid[record.at][-used:].reshape(bins, per_bin, -1) > 0.0
+    count = compared.sum(axis=1)
+    mean = np.where(compared, measured, 0.0).sum(axis=1) / np.where(count, count, np.nan)
     grid = np.concatenate([[0.0], centre])
-    return record._replace(
+    coarse = record._replace(
         **on_grid(grid, np.arange(1, bins + 1)),
         measured=mean,
         noise=record.noise / np.sqrt(per_bin),
-        weight=None,
         signals={name: _in_bins(signal, used, per_bin, grid) for name, signal in record.signals.items()},
-        bin=bin_,
+        bin=np.arange(-1, bins),
         valid=np.concatenate([np.zeros((1, mean.shape[1])), np.sqrt(count / per_bin)]),
         bins=bins,
+        means_over=per_bin,
     )
+    return coarse.in_band(record.below)
 
 
 def _in_bins(signal: Signal, used: int, per_bin: int, grid: np.ndarray) -> Signal:

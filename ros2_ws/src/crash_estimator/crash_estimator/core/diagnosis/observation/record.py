@@ -86,6 +86,7 @@ class ObservedRecord(NamedTuple):
     bins: int
     cosines: np.ndarray  # (g, 1 + DRIVEN_MODES), the mean first
     whitener: np.ndarray | None = None  # (q, q) of outputs in units of their noise; None: independent, as the sensors'
+    means_over: int = 1  # of the sensors' samples, for which `spectra` hold, that one of these is a mean of
     below: float = np.inf  # Hz: the band that is compared
     in_doubt: bool = False  # masses may be off by what scales miss, and zeros drift
     weight: np.ndarray | None = None  # (bins, q) of the outputs' frequencies, `whitening.weights`; None: all alike
@@ -106,8 +107,13 @@ class ObservedRecord(NamedTuple):
 
     def in_band(self, below: float) -> "ObservedRecord":
         """Compared below so many Hz only."""
-        weight = weights(self.spectra, below, self.bins, self.period, self.per_bin)
-        return self._replace(below=below, weight=weight)
+        inside = self._replace(below=below)
+        return inside._replace(weight=inside.weights_of(self.bins, self.per_bin))
+
+    def weights_of(self, n: int, per_mean: int = 1) -> np.ndarray | None:
+        """`whitening.weights` of n means over so many samples each."""
+        period, means_over = self.period / self.means_over, per_mean * self.means_over
+        return weights(self.spectra, self.below, n, period, means_over)
 
     @property
     def compared(self) -> np.ndarray:

@@ -73,6 +73,8 @@ class OnlineDiagnosis:
         rest = rest_of(quiet_of(recording), self.other_rests)
         full = [observe(self.structure, recording, rest), *self.other_records]
         records = [in_bins(record) for record in full]
+        if not (records[0].valid > 0.0).any(axis=0).all():  # a filter shows what was before the impact in all of them
+            return state, None
         magnitudes = measure_magnitudes(
             self.structure, records, min(CELLS, CELLS_IN_ALL // len(self.structure.elements))
         )

@@ -9,7 +9,7 @@ from ..mechanics.linearization import Equations, linearise
 from ..mechanics.link_force import LinkForce
 from ..mechanics.outputs import output_noise, predicted
 from ..observation.record import ObservedRecord
-from ..observation.whitening import filtered, weights
+from ..observation.whitening import filtered
 from ..output_error.gauss_newton import Fit
 from ..output_error.normal_equations import may_diverge, whitened
 from ..output_error.problem import OutputErrorProblem, Point
@@ -120,7 +120,7 @@ def _noise_samples(records: Sequence[ObservedRecord]) -> list[np.ndarray]:
 
 def _white(record: ObservedRecord, z: np.ndarray) -> np.ndarray:
     """Residuals (n, q) in units of the noise, as if that were white, in the band that is compared."""
-    weight = weights(record.spectra, record.below, len(z), record.period)
+    weight = record.weights_of(len(z))
     if weight is None or record.noise_is_inflated:
         return z
     return np.where(np.isfinite(z), filtered(np.nan_to_num(z), weight), np.nan)
