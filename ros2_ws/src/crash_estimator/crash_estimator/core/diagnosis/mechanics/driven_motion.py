@@ -34,15 +34,9 @@ class Distortion(NamedTuple):
         return [(p, one.effect.course(one.variant, time)) for p, _, one in self.offsets]
 
 
-NO_DISTORTION = Distortion()
-
-
 def distortion(layout: Layout, theta: np.ndarray, channel: str) -> Distortion:
-    terms = [t for t in layout.terms if t.addition.target == channel and t.addition.effect.distorts]
-    if not terms:
-        return NO_DISTORTION
-    found = NO_DISTORTION
-    for term in terms:
+    found = Distortion()
+    for term in (t for t in layout.terms if t.addition.target == channel):
         p, value = term.coefficient, float(theta[term.coefficient])
         match term.addition.effect.distorts:
             case "gain":

@@ -85,7 +85,7 @@ def linearise(
         c = float(theta[term.coefficient])
         loads[:, k] += c * force
         actions.act(term.coefficient, k, inverse[k] * force)
-        for parameter, column in zip(term.varied.values(), by_shapes, strict=True):
+        for parameter, column in zip(term.shapes.values(), by_shapes, strict=True):
             actions.act(parameter, k, inverse[k] * c * column)
     for k, body in enumerate(layout.structure.bodies):
         if body.applied:

@@ -101,7 +101,7 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
             h, dh, by_shape = _factor(term, theta, rate)
             factor = factor + c * h
             kv = kv + static * c * dh
-            parameters += [term.coefficient, *term.varied.values()]
+            parameters += [term.coefficient, *term.shapes.values()]
             columns += [static * h, *(static * c * d for d in by_shape)]
         force, kx, kp, weight = static * factor, kx * factor, kp * factor, weight * factor[:, None]
     if link.curve is None and link.constant is not None:
@@ -136,7 +136,7 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
                 continue
             fx, fv, by_shape = _slopes(term, theta, motion, f)
             beside.add(c * f, c * fx, c * fv)
-            parameters += term.varied.values()
+            parameters += term.shapes.values()
             columns += [beside.gate * c * d for d in by_shape]
         for term in link.remembering:
             beside = crushed if link.outlasts(term.addition.effect) else contact
@@ -193,7 +193,7 @@ def _inside(term: Term, theta: np.ndarray, at: np.ndarray) -> _Inside:
     motion = ElementMotion(nothing, at, nothing, at, nothing)
     f = _physics(term).force(motion, **term.shapes_at(theta))
     slope, _, by_shape = _slopes(term, theta, motion, f)
-    parameters = [term.coefficient, *term.varied.values()]
+    parameters = [term.coefficient, *term.shapes.values()]
     return _Inside(c * f, c * slope, parameters, [f, *(c * each for each in by_shape)])
 
 
@@ -208,7 +208,7 @@ def _remembered(term: Term, link: Link, theta, time, x, beside: _Beside, paramet
     columns.append(gate * z)
     if not c:  # nothing that the motion or a shape constant would change
         return []
-    parameters += term.varied.values()
+    parameters += term.shapes.values()
     columns += [gate * c * d for d in term.by_shapes(theta, z, lambda **s: memory(crush, 0.0, **s)[0][1:])]
     if not link.tension:
         by_crush, by_before = by_crush * (x > 0.0), by_before * (crush[:-1] > 0.0)

@@ -133,7 +133,7 @@ def equation_error_start(problem: OutputErrorProblem, held: Sequence[int] = ()) 
     stays = shape_parameters(layout)
     stays[layout.common :] = True
     stays[list(held)] = True
-    normal = equation_error(problem.holding_shapes(), point)
+    normal = equation_error(problem, point)
     step = solve(layout, normal, point.theta, FROM_MEASURED_MOTION[0].inflate, stays)
     return Point(point.theta + step.delta, point.trajectories)
 
@@ -159,7 +159,6 @@ def fit(
     layout = problem.layout
     stages = list(schedule or (() if start else FROM_MEASURED_MOTION))
     most += max(len(stages) - len(FROM_MEASURED_MOTION), 0)
-    in_given_shapes = problem.holding_shapes()
     point = start or equation_error_start(problem, (*held, *layout.trusted))
     shapes = shape_parameters(layout)
     stays, trusted = (np.isin(np.arange(layout.size), which) for which in (held, layout.trusted))
@@ -171,10 +170,9 @@ def fit(
         _made.set(iterations_made() + 1)
         stage = stages.pop(0) if stages else FREE_RUN
         try:
+            normal, equations = normal_equations(problem, point, stage)
             # a shape constant fitted to a motion that is still wrong goes astray
-            still_wrong = stage.inflate > 1.0
-            normal, equations = normal_equations(in_given_shapes if still_wrong else problem, point, stage)
-            fixed = stays | shapes if still_wrong else stays
+            fixed = stays | shapes if stage.inflate > 1.0 else stays
             fixed = fixed | trusted if stage.observer > 0.0 else fixed
             step = solve(layout, normal, point.theta, stage.inflate, fixed)
         except LinAlgError:

@@ -38,10 +38,6 @@ class OutputErrorProblem(NamedTuple):
         """The same parameters on other records of the same tests, as with other noise."""
         return OutputErrorProblem(self.layout, experiments_of(self.layout, records))
 
-    def holding_shapes(self) -> "OutputErrorProblem":
-        """The same, where shape constants stay."""
-        return self._replace(layout=self.layout.holding_shapes()).on(self.records)
-
     def starting_at(self, start: np.ndarray, trusted: Sequence[int] = ()) -> "OutputErrorProblem":
         """The same with other starting values (p,).
 

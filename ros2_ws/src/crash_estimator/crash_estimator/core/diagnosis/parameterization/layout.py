@@ -6,7 +6,6 @@ motions, errors of the velocities that it starts with).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -69,11 +68,6 @@ class Layout(NamedTuple):
         """Constant stiffnesses -> what the model file says of them, N/m."""
         links = (link for link in self.links if link.constant is not None)
         return {link.constant: link.known_stiffness for link in links if link.known_stiffness > 0.0}
-
-    def holding_shapes(self) -> "Layout":
-        """The same parameters, of which no force is differentiated by a shape constant."""
-        links = (replace(link, terms=tuple(term._replace(held=True) for term in link.terms)) for link in self.links)
-        return self._replace(links=tuple(links), terms=tuple(term._replace(held=True) for term in self.terms))
 
     def term(self, addition: Addition) -> Term:
         """That of an addition with the same effect and target: a model has no effect twice on one target."""
@@ -180,8 +174,7 @@ def _touch_name(addition: Addition) -> str:
 def _element_curve(b: Builder, k: int, element, magnitudes: Magnitudes, roughness: Mapping[str, np.ndarray]) -> Curve:
     low, high = magnitudes.crush_range[k]
     crush = magnitudes.crush[k]
-    one_way = not element.tension
-    knots = make_knots(low, high, crush, magnitudes.cells, tension=not one_way)
+    knots = make_knots(low, high, crush, magnitudes.cells, element.tension)
     return b.curve(element.name, knots, crush, magnitudes.force[k], roughness.get(element.name, ROUGHNESS))
 
 

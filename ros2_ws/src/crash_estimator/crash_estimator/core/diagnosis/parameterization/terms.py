@@ -23,20 +23,14 @@ class Term(NamedTuple):
     addition: Addition
     coefficient: int
     shapes: dict[str, int]
-    held: bool = False  # its shape constants stay: nothing is differentiated by them
-
-    @property
-    def varied(self) -> dict[str, int]:
-        """Shape constants that the force is differentiated by."""
-        return {} if self.held else self.shapes
 
     def shapes_at(self, theta: np.ndarray, longer: str = "") -> dict[str, float]:
         """Its shape constants, the logarithm of one of them longer by a step."""
         return {name: float(np.exp(theta[p] + LOG_STEP * (name == longer))) for name, p in self.shapes.items()}
 
     def by_shapes(self, theta: np.ndarray, value: np.ndarray, function: Callable[..., np.ndarray]) -> list[np.ndarray]:
-        """Derivatives of function(**shapes), whose value is known, by the logarithm of each that varies."""
-        return [(function(**self.shapes_at(theta, name)) - value) / LOG_STEP for name in self.varied]
+        """Derivatives of function(**shapes), whose value is known, by the logarithm of each."""
+        return [(function(**self.shapes_at(theta, name)) - value) / LOG_STEP for name in self.shapes]
 
 
 @dataclass(frozen=True)
