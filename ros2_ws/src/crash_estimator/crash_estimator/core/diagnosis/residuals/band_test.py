@@ -38,7 +38,6 @@ class Band(NamedTuple):
     output: int
     low: float  # Hz
     high: float  # Hz
-    ratio: float  # power over the noise's
 
 
 class BandTest(NamedTuple):
@@ -66,7 +65,7 @@ def band_test(residuals, noise_samples, periods) -> BandTest:
             for low, high, inside in bands:
                 ratio = float(power[inside].mean())
                 p = probability_of(int(np.count_nonzero(inside)), samples[q], ratio)
-                found.append((p, Band(r, q, low, min(high, 0.5 / period), ratio)))
+                found.append((p, Band(r, q, low, min(high, 0.5 / period))))
     return _worst_of(found)
 
 
@@ -88,7 +87,7 @@ def band_test_of_fit(records: Sequence[Sequence[Absorbed]], noise_samples) -> Ba
                 if mean < LEAST_LEFT:
                     continue
                 ratio = float(power[inside].sum()) / mean
-                found.append((probability_of(mean**2 / square, samples[q], ratio), Band(r, q, low, high, ratio)))
+                found.append((probability_of(mean**2 / square, samples[q], ratio), Band(r, q, low, high)))
     return _worst_of(found)
 
 
@@ -111,6 +110,6 @@ def of_any(least: float, tests: int) -> float:
 
 
 def _worst_of(found: Sequence[tuple[float, Band]]) -> BandTest:
-    least = min(found, key=lambda one: one[0], default=(1.0, Band(0, 0, 0.0, 0.0, 0.0)))
+    least = min(found, key=lambda one: one[0], default=(1.0, Band(0, 0, 0.0, 0.0)))
     probability = of_any(least[0], len(found))
     return BandTest(probability > SIGNIFICANT, probability, least[1])
