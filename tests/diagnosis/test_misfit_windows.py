@@ -24,7 +24,9 @@ def windows(left: np.ndarray, apart: float = 0.0, unloads: float = 0.0, seed: in
     body = SimpleNamespace(name="car")
     link, force = SimpleNamespace(ends=(0, 1)), np.ones(SAMPLES)
     layout = SimpleNamespace(structure=SimpleNamespace(bodies=[body]), outputs=[SimpleNamespace(body=0)], links=[link])
-    record = SimpleNamespace(time=time, at=at, measured=residual[:, None] + 7.0, test=SimpleNamespace(id="T"))
+    record = SimpleNamespace(
+        time=time, at=at, period=DT, measured=residual[:, None] + 7.0, test=SimpleNamespace(id="T")
+    )
     acting = SimpleNamespace(force=force, apart=np.full(SAMPLES, apart), unloads=np.full(SAMPLES, unloads))
     residuals = SimpleNamespace(
         residual=[residual[:, None]], noise=[np.array([NOISE])], links=[[acting]],

@@ -225,14 +225,8 @@ def _term(b: Builder, addition: Addition, magnitudes: Magnitudes) -> Term:
         unit = magnitudes.shape_unit(shape, addition.target)
         low, high = np.log(shape.low * unit), np.log(shape.high * unit)
         start = np.log(addition.shapes[name])
-        shapes[name] = b.add(
-            f"{effect.name} {addition.target} {name}",
-            start,
-            (high - low) / np.sqrt(12.0),
-            0.5 * (low + high),
-            low,
-            high,
-        )
+        even = (high - low) / np.sqrt(12.0)  # as a flat prior between the limits has
+        shapes[name] = b.add(f"{effect.name} {addition.target} {name}", start, even, 0.5 * (low + high), low, high)
     return Term(addition, coefficient, shapes)
 
 

@@ -159,19 +159,8 @@ def measure_magnitudes(
     reach = crush_range[:, 1] - crush_range[:, 0]
     shortest = min(SHORTEST_CRUSH, SHORTEST_SHARE * float(reach.max(initial=0.0))) or SHORTEST_CRUSH
     crush = np.maximum(reach, shortest)
-    stiffness = force / crush
     return Magnitudes(
-        structure,
-        records,
-        measured,
-        body_force,
-        crush_range,
-        rate,
-        crush,
-        force,
-        stiffness,
-        cells,
-        shortest,
+        structure, records, measured, body_force, crush_range, rate, crush, force, force / crush, cells, shortest
     )
 
 

@@ -38,13 +38,7 @@ class Builder:
         return len(self.parameters) - 1
 
     def curve(
-        self,
-        name: str,
-        knots: np.ndarray,
-        crush: float,
-        force: float,
-        roughness: np.ndarray | float,
-        start: float = 1.0,
+        self, name: str, knots: np.ndarray, crush: float, force: float, roughness: np.ndarray | float, start=1.0
     ) -> Curve:
         """start: share of the straight line to the force scale that it begins with."""
         inner = knots != 0.0

@@ -35,7 +35,7 @@ def misfit_windows(layout: Layout, records: Sequence[ObservedRecord], residuals:
     tests = sum(record.measured.size for record in records)
     for r, record in enumerate(records):
         time = record.time[record.at]
-        length = min(max(int(round(WINDOW / float(np.median(np.diff(time))))), 4), len(time))
+        length = min(max(int(round(WINDOW / record.period)), 4), len(time))
         for q, output in enumerate(layout.outputs):
             residual, scale = residuals.residual[r][:, q], output_scale(layout)[q]
             z2 = np.nan_to_num(residual / residuals.noise[r][q]) ** 2
