@@ -8,7 +8,10 @@ from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
 def model(white=False, cost=1000.0, mean_square=50.0, evidence=0.0, additions=()):
     fit = SimpleNamespace(cost=cost, evidence=evidence, layout=None, point=None)
     residuals = SimpleNamespace(mean_square=mean_square)
-    return SimpleNamespace(fit=fit, white=white, residuals=residuals, additions=additions, records=(), roughness=None)
+    return SimpleNamespace(
+        fit=fit, white=white, residuals=residuals, additions=additions, given=(), found=additions, records=(),
+        roughness=None,
+    )  # fmt: skip
 
 
 def candidate(gain, key=("friction", "spring"), fitted=True):

@@ -9,10 +9,11 @@ from crash_estimator.core.diagnosis.selection.selection_step import SelectionSte
 def model(left: float, additions: int = 0, evidence: float = 0.0) -> SimpleNamespace:
     """One that leaves a mean square of residuals, in the variance of the noise, with so many additions."""
     fit = SimpleNamespace(problem=SimpleNamespace(noise_is_inflated=False), evidence=evidence, additions=additions)
-    residuals = SimpleNamespace(mean_square=left)
+    residuals, found = SimpleNamespace(mean_square=left), ("one",) * additions
     return SimpleNamespace(
-        roughness=None, fit=fit, residuals=residuals, white=left < 1.1, additions=("one",) * additions, records=()
-    )
+        roughness=None, fit=fit, residuals=residuals, white=left < 1.1, additions=found, given=(), found=found,
+        records=(),
+    )  # fmt: skip
 
 
 def step(before: SimpleNamespace, gain: float = 500.0) -> SelectionStep:

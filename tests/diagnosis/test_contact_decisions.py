@@ -39,10 +39,10 @@ def with_contacts(monkeypatch, promised, noise_under="none", ends_early=False) -
     """Contacts a, b and c that promise something (nats) and leave noise or not -> where all is looked for, in turn."""
     searched = []
 
-    def search(structure, records, effects, expected=(), elsewhere=lambda path: False):
+    def search(structure, records, effects, elsewhere=lambda path: False):
         searched.append(structure)
         final = model(white=structure == noise_under)
-        path = assumptions.SelectionPath(structure, [], final, 0, final.fit, (), 36)
+        path = assumptions.SelectionPath(structure, [], final, final.fit, (), 36)
         begun = path._replace(whole=False)
         return begun if ends_early and elsewhere(begun) else path
 

@@ -110,11 +110,11 @@ def test_steps_after_the_least_error_are_not_told(monkeypatch):
     assert not final.white and len(final.additions) == 2
     sizes = [in_band(one.fit, one.residuals, band_of_steps(path)).rms for one in sized_models(path, final)]
     assert sizes[0] > sizes[1] > sizes[2]
-    assert up_to_the_least_error(path, final, 0) == (path, final)
+    assert up_to_the_least_error(path, final) == (path, final)
     for errors, kept in (((3.0, 4.0, 3.5), 0), ((3.0, 2.0, 2.0), 1), ((3.0, 2.0, 1.0), 2), ((3.0, 4.0, 1.0), 2)):
         told = iter(errors)
         monkeypatch.setattr(pruning, "in_band", lambda fit, residuals, cfc, told=told: SimpleNamespace(rms=next(told)))
-        cut, last = up_to_the_least_error(path, final, 0)
+        cut, last = up_to_the_least_error(path, final)
         assert last is [path[0].before, path[1].before, final][kept]
         assert cut == (path if kept == 2 else path[: kept + 1])
 
@@ -126,5 +126,5 @@ def test_an_effect_that_is_found_to_be_nothing_is_not_told():
     theta = np.where(np.arange(len(best.fit.theta)) == term.coefficient, 0.0, best.fit.theta)
     nothing = best._replace(fit=best.fit._replace(theta=theta))
     told = [path[0], path[1]._replace(candidates=[nothing, *others]), *path[2:]]
-    cut, last = up_to_the_least_error(told, final, 0)
+    cut, last = up_to_the_least_error(told, final)
     assert last is told[1].before and cut == told[:2]

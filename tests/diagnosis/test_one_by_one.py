@@ -57,7 +57,7 @@ def test_beside_a_rare_effect_only_one_elsewhere_is_looked_at(monkeypatch, rare)
     monkeypatch.setattr(forward_selection, "only_screened", lambda *given: "nothing else")
     monkeypatch.setattr(forward_selection, "_all_explain_too_little", lambda *given: False)
     monkeypatch.setattr(forward_selection, "elsewhere_than", lambda rare, step: elsewhere)
-    found = forward_selection._next_step(None, {}, model(50.0, 1), [], 0)
+    found = forward_selection._next_step(None, {}, model(50.0, 1), [])
     assert found == ("nothing else" if rare else beside)
 
 
@@ -144,5 +144,5 @@ def one_by_one(
     monkeypatch.setattr(forward_selection, "band_of_steps", lambda path: None)
     monkeypatch.setattr(forward_selection, "evenly_fitted", lambda *given: "with it")
     monkeypatch.setattr(forward_selection, "explains_too_little", little)
-    monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final, present: (path, final))
-    return forward_selection._one_by_one(SimpleNamespace(structure=None), {}, model(left), [], 0)
+    monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final: (path, final))
+    return forward_selection._one_by_one(SimpleNamespace(structure=None), {}, model(left), [])

@@ -12,7 +12,8 @@ from crash_estimator.core.diagnosis.selection.selection_step import SelectionSte
 
 def model(additions, white=True):
     evidence = 1000.0 if white else 0.0
-    return SimpleNamespace(additions=tuple(additions), white=white, fit=SimpleNamespace(evidence=evidence))
+    found = tuple(additions)
+    return SimpleNamespace(additions=found, given=(), found=found, white=white, fit=SimpleNamespace(evidence=evidence))
 
 
 @pytest.mark.parametrize(
@@ -35,7 +36,7 @@ def test_an_effect_that_the_rest_leaves_noise_without_goes_again(monkeypatch, sp
     path = [SelectionStep(model(names[:k], k == 3), [CandidateFit(name, 50.0, "fit")]) for k, name in enumerate(names)]
     path.append(SelectionStep(model(names), []))
     path[-1] = path[-1]._replace(candidates=[CandidateFit("none", 0.5 * THRESHOLDS.gain, "fit")])
-    found, final = pruning.without_the_superseded(None, path, model(names), 0)
+    found, final = pruning.without_the_superseded(None, path, model(names))
     assert list(final.additions) == left
     assert [step.candidates[0].addition for step in found] == [*left, "none"]
     assert found[-1].before.additions == final.additions
@@ -49,12 +50,12 @@ def test_what_has_ended_at_nothing_goes_where_more_than_noise_is_left_too(monkey
     terms = {id(mimic): SimpleNamespace(coefficient=0), id(damper): SimpleNamespace(coefficient=1)}
     layout = SimpleNamespace(term=lambda addition: terms[id(addition)])
     fit = SimpleNamespace(evidence=1000.0, layout=layout, theta=[ended, 500.0])
-    final = SimpleNamespace(additions=(mimic, damper), white=False, fit=fit)
-    smaller = SimpleNamespace(additions=(damper,), white=False, fit=SimpleNamespace(evidence=1000.0))
+    final = SimpleNamespace(additions=(mimic, damper), given=(), found=(mimic, damper), white=False, fit=fit)
+    smaller = SimpleNamespace(additions=(damper,), found=(damper,), white=False, fit=SimpleNamespace(evidence=1000.0))
     monkeypatch.setattr(pruning, "_refitted", lambda magnitudes, additions, like: smaller)
     path = [SelectionStep(None, [CandidateFit(one, 50.0, "fit")]) for one in (mimic, damper)]
     path.append(SelectionStep(final, [CandidateFit("none", 0.0, "fit")]))
-    _, model_left = pruning.without_the_superseded(None, path, final, 0)
+    _, model_left = pruning.without_the_superseded(None, path, final)
     assert [names[id(one)] for one in model_left.additions] == left
 
 
@@ -67,4 +68,4 @@ def test_an_effect_that_gains_nothing_beside_the_rest_goes_whatever_is_left_with
     monkeypatch.setattr(pruning, "_refitted", lambda magnitudes, additions, like: smaller)
     path = [SelectionStep(model(names[:k], False), [CandidateFit(name, 50.0, "fit")]) for k, name in enumerate(names)]
     path.append(SelectionStep(model(names), [CandidateFit("none", 0.0, "fit")]))
-    assert list(pruning.without_the_superseded(None, path, model(names), 0)[1].additions) == left
+    assert list(pruning.without_the_superseded(None, path, model(names))[1].additions) == left

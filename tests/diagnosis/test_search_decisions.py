@@ -108,9 +108,9 @@ def test_an_effect_on_two_elements_is_looked_for_only_where_one_does_not_explain
 def test_the_first_effect_of_a_path_was_followed_where_a_second_was_fitted_beside_it():
     one = SimpleNamespace(key=("friction", "spring"))
     first = SimpleNamespace(before=model(), candidates=[candidate(500.0)])
-    second = SimpleNamespace(before=model(additions=("present", one)), candidates=[candidate(1.0)])
+    second = SimpleNamespace(before=model(additions=(one,)), candidates=[candidate(1.0)])
     screened = SimpleNamespace(before=second.before, candidates=[candidate(1.0, fitted=False)])
-    followed = [forward_selection._followed(path, 1) for path in ([first], [first, screened], [first, second])]
+    followed = [forward_selection._followed(path) for path in ([first], [first, screened], [first, second])]
     assert followed == [None, None, one.key]
 
 
@@ -153,7 +153,7 @@ def test_a_further_step_goes_on_only_where_a_candidate_explains_more_than_too_li
     monkeypatch.setattr(forward_selection, "as_fitted", lambda before, one: one.gain)
     little = lambda before, gain, band: gain < THRESHOLDS.least_share  # noqa: E731
     monkeypatch.setattr(forward_selection, "explains_too_little", little)
-    found = forward_selection._next_step(None, {}, model(additions=("one",)), ["the first step"], 0)
+    found = forward_selection._next_step(None, {}, model(additions=("one",)), ["the first step"])
     assert found == (step if believed else "screened")
 
 
@@ -191,8 +191,8 @@ def test_a_search_that_is_over_has_looked_at_all_candidates_once(monkeypatch):
     monkeypatch.setattr(forward_selection, "_none_leads", lambda step: False)
     monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done, path, evenly: done)
     monkeypatch.setattr(forward_selection, "better", lambda one, other: False)
-    monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final, present: (path, final))
-    path, _ = forward_selection._one_by_one(MAGNITUDES, {}, model(), [], 0)
+    monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final: (path, final))
+    path, _ = forward_selection._one_by_one(MAGNITUDES, {}, model(), [])
     assert path == [step]
 
 

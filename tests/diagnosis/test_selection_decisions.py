@@ -23,7 +23,7 @@ from crash_estimator.core.diagnosis.selection.fitted_model import forces_jump
 )
 def test_how_many_additions_are_believed_together(left, believed):
     models = [model(mean_square, k) for k, mean_square in enumerate(left)]
-    path = assumptions.SelectionPath(None, [step(m) for m in models[:-1]], models[-1], 0, models[-1].fit, (), 36)
+    path = assumptions.SelectionPath(None, [step(m) for m in models[:-1]], models[-1], models[-1].fit, (), 36)
     found = assumptions.first_believed(path)
     assert len(found.final.additions) == found.as_recorded.additions == believed
     assert len(found.steps) == min(believed + 1, len(models) - 1)
@@ -31,7 +31,7 @@ def test_how_many_additions_are_believed_together(left, believed):
 
 @pytest.mark.parametrize(("left", "over"), [(1.0, False), (1.5, True)])
 def test_what_leaves_noise_or_has_no_time_is_not_searched_in_a_smaller_band(monkeypatch, left, over):
-    path = assumptions.SelectionPath(None, [], model(left), 0, None, (), 36)
+    path = assumptions.SelectionPath(None, [], model(left), None, (), 36)
     monkeypatch.setattr(assumptions, "_selected", lambda *given: path)
     monkeypatch.setattr(assumptions, "search_is_over", lambda: over)
     assert assumptions.select(None, (), {}) is path  # the band would be asked of its fit, which is none
@@ -41,7 +41,7 @@ def test_what_leaves_noise_or_has_no_time_is_not_searched_in_a_smaller_band(monk
 def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypatch, wanted, over, searches):
     begun, cells, given = [], [], model(1.5)
     made_up = {
-        "first_step": lambda *given: None,
+        "first_step": lambda *given: SimpleNamespace(leaves_noise=True),
         "forward_selection": lambda *given: begun.append(given) or ([step(given[2])], given[2]),
         "sized_models": lambda steps, final: [final],
         "measure_magnitudes": lambda structure, records, finer: cells.append(finer) or SimpleNamespace(cells=finer),
@@ -49,13 +49,13 @@ def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypa
         "drift_of": lambda fit: SimpleNamespace(constant=True),
         "analyse": lambda fit: None,
         "_wants_finer_curves": lambda *given: wanted,
-        "up_to_the_least_error": lambda steps, final, present: (steps, final),
+        "up_to_the_least_error": lambda steps, final: (steps, final),
         "search_is_over": lambda: over,
     }
     for name, instead in made_up.items():
         monkeypatch.setattr(assumptions, name, instead)
     magnitudes = SimpleNamespace(structure=None, records=(), cells=36)
-    assumptions._with_curves_as_fine_as_needed(magnitudes, given, {}, ())
+    assumptions._with_curves_as_fine_as_needed(magnitudes, given, {})
     assert len(begun) == searches
     assert cells == [2 * magnitudes.cells], "of half the width"
 
@@ -156,7 +156,7 @@ def test_a_time_zero_counts_as_what_was_added_where_no_effect_was(monkeypatch, e
     for one in models:
         one.fit.problem.noise_is_inflated = False
     path = assumptions.SelectionPath(
-        None, [step(m) for m in models[:-1]] or [step(models[0])], models[-1], 0, None, (), 36
+        None, [step(m) for m in models[:-1]] or [step(models[0])], models[-1], None, (), 36
     )
     left, sure = SimpleNamespace(share_explained=lambda before: 0.5), SimpleNamespace(coefficient=2.0, std=1.0)
     made_up = {

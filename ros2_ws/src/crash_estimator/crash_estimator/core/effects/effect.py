@@ -216,8 +216,9 @@ class Effect:
         """Nats that it must gain with the coefficient c over others, where no measurement can tell them apart."""
         return 0.0
 
-    def is_doubt(self, structure: Structure, addition: "Addition", c: float) -> bool:
-        """Whether it is no more with the coefficient c than what is not known of a right model anyway."""
+    def is_doubt(self, magnitudes: "Magnitudes", addition: "Addition", c: float, shapes: Mapping[str, float]) -> bool:
+        """Whether it is no more, with the coefficient and shape constants found, than what is not known of a right
+        model anyway, or than what another effect is named for."""
         return False
 
     def stated(self, c: float, **shapes: float) -> float:
@@ -246,3 +247,8 @@ class Addition:
     @property
     def key(self) -> tuple[str, str]:
         return self.effect.name, self.target
+
+    def spec(self, coefficient: float | None = None, shape: Mapping[str, float] | None = None) -> EffectSpec:
+        """As a model file says it; without a coefficient that and the shape constants are found from the data."""
+        beside = self.host, self.touches, self.taken_from, self.variant
+        return EffectSpec(*self.key, coefficient, dict(shape or {}), *beside)

@@ -17,7 +17,7 @@ from crash_replay.recording import Recording, Test
 from ...effects import EFFECTS
 from ...effects.effect import Addition, Effect
 from ...kinematics import Kinematics
-from ...structure import EffectSpec, Structure
+from ...structure import Structure
 from ..observation.bin_means import in_bins
 from ..observation.record import FEWEST_SAMPLES, ObservedRecord, observe
 from ..observation.rest import Quiet, quiet_of, rest_of, rests_of
@@ -87,7 +87,7 @@ class OnlineDiagnosis:
         done = SelectionStep(given, [one._replace(gain=one.gain / max(residuals.mean_square, 1.0)) for one in tried])
         best = done.best
         residuals = residuals if best else given.residuals
-        layout, found = given.fit.layout, (_spec(best.addition),) if best else ()
+        layout, found = given.fit.layout, (best.addition.spec(),) if best else ()
         finely = [
             _finely(each, full, records) for each in ((given.residuals, residuals) if best else (given.residuals,))
         ]
@@ -137,17 +137,6 @@ def _finely(
 
 def _rms(layout: Layout, full: Sequence[ObservedRecord], predicted: Sequence[np.ndarray]) -> float:
     return rms(layout, [every.measured - output for every, output in zip(full, predicted, strict=True)])
-
-
-def _spec(addition: Addition) -> EffectSpec:
-    """Without coefficient and shape constants: they ripen."""
-    return EffectSpec(
-        *addition.key,
-        host=addition.host,
-        touches=addition.touches,
-        taken_from=addition.taken_from,
-        variant=addition.variant,
-    )
 
 
 def _text(recording: Recording, answer: OnlineAnswer) -> str:

@@ -25,7 +25,6 @@ from ..selection.thresholds import THRESHOLDS
 from ..selection.time_zero import TimeZero
 from .fitted_constants import FittedConstant, fitted_constants
 from .left import Left, left_by
-from .model_effects import structure_with
 from .ranking import Ranked, StepReport, ranking_of, step_of
 from .time_zero_step import TIME_ZERO, as_ranked, signals_begin, time_zero_step
 from .tolerance import DEFAULT, Tolerance
@@ -177,9 +176,16 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
         constants=fitted_constants(of_all),
         misfit=misfit_windows(given.fit.layout, given.records, given.residuals),
         misfit_after=misfit_windows(final.fit.layout, final.records, final.residuals),
-        structure=structure_with(path.structure, added, effects_added),
+        structure=_with_effects(path.structure, added, effects_added),
         models=models,
     )
+
+
+def _with_effects(structure: Structure, added: Sequence[Addition], steps: Sequence[StepReport]) -> Structure:
+    """The structure with what was added, as large as the answer says; without what is wrong in one recording."""
+    pairs = zip(added, steps, strict=True)
+    found = [one.spec(step.coefficient, step.shape) for one, step in pairs if not one.recording]
+    return replace(structure, effects=(*structure.effects, *found))
 
 
 def _drift_left_by(path: SelectionPath, sized: Model) -> Drift:

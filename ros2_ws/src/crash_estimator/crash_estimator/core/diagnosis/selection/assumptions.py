@@ -40,7 +40,6 @@ class SelectionPath(NamedTuple):
     structure: Structure  # as it was assumed
     steps: list[SelectionStep]
     final: Model
-    present: int  # additions that the structure had
     as_recorded: Fit  # of the final model, in the sensors' noise
     records: Sequence[ObservedRecord]  # in the band that was compared
     cells: int  # of the final model's curves
@@ -53,7 +52,7 @@ class SelectionPath(NamedTuple):
 
     @property
     def added(self) -> Sequence[Addition]:
-        return self.final.additions[self.present :]
+        return self.final.found
 
     def rank(self) -> tuple[bool, bool, float]:
         """Of paths under different assumptions the largest is believed."""
@@ -98,7 +97,7 @@ def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: 
     while untried and not search_is_over() and (others := promised(path)):
         best = max(others, key=others.__getitem__)
         untried.remove(best)
-        otherwise = _as_exact_as_needed(best(path.structure), path.records, effects, path.added)
+        otherwise = _as_exact_as_needed(best(path.structure), path.records, effects)
         tried.append(otherwise.structure)
         path = max(path, otherwise, key=SelectionPath.rank)
     return path
@@ -108,7 +107,7 @@ def first_believed(path: SelectionPath) -> SelectionPath:
     """Up to as many additions as are believed together, where all of them leave more than noise, or where these leave
     next to nothing: the first ones explain most, and what came after them only goes on from there."""
     most = THRESHOLDS.most_at_once
-    if len(path.final.additions) - path.present <= most:
+    if len(path.added) <= most:
         return path
     final = path.steps[most].before
     if path.final.white and share_removed(path.steps[0].before.residuals, final.residuals) < THRESHOLDS.all_but_folds:
@@ -163,27 +162,27 @@ def _likely(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]]:
 
 def _as_exact_as_needed(
     structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect],
-    expected: Sequence[Addition] = (), elsewhere: Callable[[SelectionPath], bool] = lambda path: False,
+    elsewhere: Callable[[SelectionPath], bool] = lambda path: False,
 ) -> SelectionPath:  # fmt: skip
     """Masses and zeros are as stated, unless nothing but noise is left with errors of them such as scales and sensors
     have: by the model as given, or with fewer effects than were found.
 
-    expected: found under other assumptions; elsewhere: whether others promise more than a first step does.
+    elsewhere: whether other assumptions promise more than a first step does.
     """
     magnitudes, given = _as_given(structure, records, effects)
     if records[0].in_doubt:
-        return _with_curves_as_fine_as_needed(magnitudes, given, effects, expected, elsewhere)
+        return _with_curves_as_fine_as_needed(magnitudes, given, effects, elsewhere)
     doubted = magnitudes._replace(records=[record._replace(in_doubt=True) for record in records])
     start, path = _in_doubt(doubted, given), None
     if not _leaves_noise(start):
-        path = _with_curves_as_fine_as_needed(magnitudes, given, effects, expected, elsewhere)
+        path = _with_curves_as_fine_as_needed(magnitudes, given, effects, elsewhere)
         models = [step.before for step in path.steps if step.before is not given]
         models += [] if path.steps[-1].before is path.final else [path.final]
         fewer = (_in_doubt(doubted, model) for model in models if not (model is path.final and path.noise))
         if search_is_over() or not any(map(_leaves_noise, fewer)):
             return path
         start = _in_doubt(doubted, path.steps[0].before)  # a candidate's fit may have shown a better one
-    other = _with_curves_as_fine_as_needed(doubted, start, effects, path.added if path else expected)
+    other = _with_curves_as_fine_as_needed(doubted, start, effects)
     if path is None or (other.noise and (not path.noise or len(other.steps) < len(path.steps))):
         return other
     return path
@@ -213,35 +212,34 @@ def _leaves_noise(model: Model) -> bool:
 
 
 def _with_curves_as_fine_as_needed(
-    magnitudes: Magnitudes, given: Model, effects: Mapping[str, Effect], expected: Sequence[Addition],
+    magnitudes: Magnitudes, given: Model, effects: Mapping[str, Effect],
     elsewhere: Callable[[SelectionPath], bool] = lambda path: False,
 ) -> SelectionPath:  # fmt: skip
-    structure, records, present = magnitudes.structure, magnitudes.records, given.additions
-    cells, first = magnitudes.cells, first_step(magnitudes, effects, given, expected)
-    if isinstance(first, SelectionStep) and not (first.leaves_noise or search_is_over()):
-        begun = SelectionPath(structure, [first], given, len(present), given.fit, records, cells, whole=False)
+    structure, records = magnitudes.structure, magnitudes.records
+    cells, first = magnitudes.cells, first_step(magnitudes, effects, given)
+    if not (first.leaves_noise or search_is_over()):
+        begun = SelectionPath(structure, [first], given, given.fit, records, cells, whole=False)
         if elsewhere(begun):
             return begun
     steps, final = forward_selection(magnitudes, effects, given, first)
     as_recorded = in_the_sensors_noise(sized_models(steps, final)[-1], records)
     finer = measure_magnitudes(structure, records, FINER_CELLS)
     mimicked = final.white and not drift_of(as_recorded).constant
-    if not search_is_over() and _wants_finer_curves(final, mimicked, analyse(as_recorded), finer, len(present)):
-        found = final.additions[len(present) :]
-        finer_given = fit_given(finer, records, present)
-        finer_first = first_step(finer, effects, finer_given, found)
+    if not search_is_over() and _wants_finer_curves(final, mimicked, analyse(as_recorded), finer):
+        finer_given = fit_given(finer, records, final.given)
+        finer_first = first_step(finer, effects, finer_given)
         finer_steps, finer_final = forward_selection(finer, effects, finer_given, finer_first)
         fewer = len(finer_final.additions) < len(final.additions) or not final.white
         if finer_final.white and (fewer or (mimicked and drift_of(finer_final.fit).constant)):
             steps, final, cells = finer_steps, finer_final, finer.cells
             as_recorded = in_the_sensors_noise(sized_models(steps, final)[-1], records)
-    steps, reported = up_to_the_least_error(steps, final, len(present))
+    steps, reported = up_to_the_least_error(steps, final)
     if reported is not final:
         final, as_recorded = reported, in_the_sensors_noise(sized_models(steps, reported)[-1], records)
-    return SelectionPath(structure, steps, final, len(present), as_recorded, records, cells)
+    return SelectionPath(structure, steps, final, as_recorded, records, cells)
 
 
-def _wants_finer_curves(final: Model, mimicked: bool, residuals: Residuals, finer: Magnitudes, present: int) -> bool:
+def _wants_finer_curves(final: Model, mimicked: bool, residuals: Residuals, finer: Magnitudes) -> bool:
     """Whether folds of a curve that its cells are too wide for may be what is left, or what several effects stand for.
 
     mimicked: what the final model leaves varies with time, though it is white; residuals: its in the sensors' noise.
@@ -250,8 +248,7 @@ def _wants_finer_curves(final: Model, mimicked: bool, residuals: Residuals, fine
     def refined(additions: Sequence[Addition]) -> Model:
         return fit_model(finer, finer.records, additions)
 
-    given, found = final.additions[:present], final.additions[present:]
-    if len(found) > 1 and any(refined((*given, one)).white for one in found):
+    if len(final.found) > 1 and any(refined((*final.given, one)).white for one in final.found):
         return True
     if mimicked:
         return drift_of(refined(final.additions).fit).constant

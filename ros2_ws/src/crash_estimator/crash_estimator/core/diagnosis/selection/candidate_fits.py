@@ -210,7 +210,8 @@ class _Search:
         self._note(addition, fit(problem, start, schedule, hopeless))
 
     def _note(self, addition: Addition, found: Fit) -> None:
-        if addition.effect.is_doubt(found.layout.structure, addition, _coefficient(addition, found)):
+        shapes = found.layout.term(addition).shapes_at(found.theta)
+        if addition.effect.is_doubt(self.magnitudes, addition, _coefficient(addition, found), shapes):
             return
         self.least = min(self.least, found.cost)
         gain = found.evidence - self.model.fit.evidence - odds_against(addition, found)

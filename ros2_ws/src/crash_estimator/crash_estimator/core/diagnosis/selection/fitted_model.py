@@ -40,6 +40,16 @@ class Model(NamedTuple):
         return self.fit.problem.records
 
     @property
+    def given(self) -> tuple[Addition, ...]:
+        """The additions that the structure had."""
+        return self.additions[: len(self.fit.layout.structure.effects)]
+
+    @property
+    def found(self) -> tuple[Addition, ...]:
+        """The others, in the order in which they were added."""
+        return self.additions[len(self.given) :]
+
+    @property
     def white(self) -> bool:
         """It leaves nothing but noise."""
         return self.residuals.white

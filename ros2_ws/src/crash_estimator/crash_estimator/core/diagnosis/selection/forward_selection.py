@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 
-from ...effects.effect import Addition, Effect
+from ...effects.effect import Effect
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
 from .acceptance import better, explains_too_little, needed_gain, share_explained, share_removed
 from .candidate_fits import CandidateFit
 from .even_fit import evenly_fitted
 from .fitted_model import Model
-from .pair_search import Pair, as_expected, near_the_floor, two_at_once, two_of_one_effect
+from .pair_search import Pair, near_the_floor, two_at_once, two_of_one_effect
 from .pruning import up_to_the_least_error, without_the_superseded
 from .rare_effects import common_effects, elsewhere_than, is_rare, with_rare_ones
 from .search_limit import search_is_over
@@ -17,47 +17,38 @@ from .selection_step import SelectionStep, added, as_fitted, band_of_steps, in_r
 from .thresholds import THRESHOLDS
 
 
-def first_step(
-    magnitudes: Magnitudes, effects: Mapping[str, Effect], given: Model, expected: Sequence[Addition] = ()
-) -> SelectionStep | Pair:
-    """All candidates for a first addition to the model that is given; or two of them, where they leave next to nothing.
-
-    expected: found under other assumptions.
-    """
+def first_step(magnitudes: Magnitudes, effects: Mapping[str, Effect], given: Model) -> SelectionStep:
+    """All candidates for a first addition to the model that is given."""
     common = common_effects(magnitudes.structure, effects)
-    pair = as_expected(magnitudes, common, given, expected)
-    return pair or with_rare_ones(magnitudes, effects, in_recorded_noise(magnitudes, common, given))
+    return with_rare_ones(magnitudes, effects, in_recorded_noise(magnitudes, common, given))
 
 
 def forward_selection(
-    magnitudes: Magnitudes, effects: Mapping[str, Effect], given: Model, first: SelectionStep | Pair
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], given: Model, first: SelectionStep
 ) -> tuple[list[SelectionStep], Model]:
     """All steps, and the last model; given: what it starts from, first: its `first_step`."""
-    present = len(given.additions)
     alike: list[Pair] = []
-    pair, step = (first, None) if isinstance(first, Pair) else (None, first)
-    if step and not (step.leaves_noise or _explains_nearly_all(step) or search_is_over()):
-        alike = two_of_one_effect(magnitudes, given, step.candidates)
-        pair = near_the_floor(alike, step.candidates)
-    if pair:
-        return _one_by_one(pair.magnitudes, effects, pair.model, pair.path, present)
-    path, final = _one_by_one(magnitudes, effects, given, [], present, step)
+    if not (first.leaves_noise or _explains_nearly_all(first) or search_is_over()):
+        alike = two_of_one_effect(magnitudes, given, first.candidates)
+        if pair := near_the_floor(alike, first.candidates):
+            return _one_by_one(pair.magnitudes, effects, pair.model, pair.path)
+    path, final = _one_by_one(magnitudes, effects, given, [], first)
     next_to_nothing = share_removed(given.residuals, final.residuals) > THRESHOLDS.all_but_folds
     if final.white or next_to_nothing or search_is_over():
         return path, final
-    firsts = [*step.doubted, *step.as_recorded]
-    pair = two_at_once(magnitudes, effects, given, firsts, alike, _followed(path, present))
+    firsts = [*first.doubted, *first.as_recorded]
+    pair = two_at_once(magnitudes, effects, given, firsts, alike, _followed(path))
     if pair is None:
         return path, final
-    other = _one_by_one(pair.magnitudes, effects, pair.model, pair.path, present)
+    other = _one_by_one(pair.magnitudes, effects, pair.model, pair.path)
     if other[1].white:
         return other
-    paths = [up_to_the_least_error(*one, present) for one in (other, (path, final))]
+    paths = [up_to_the_least_error(*one) for one in (other, (path, final))]
     return min(paths, key=lambda one: one[1].residuals.mean_square)
 
 
 def _one_by_one(
-    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: list[SelectionStep], present: int,
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: list[SelectionStep],
     first: SelectionStep | None = None,
 ) -> tuple[list[SelectionStep], Model]:  # fmt: skip
     """The best candidate is added as long as there is one; path: the steps that have led to the model, first: the next
@@ -65,9 +56,9 @@ def _one_by_one(
     common, evenly = common_effects(magnitudes.structure, effects), None
     while not (path and search_is_over()):
         if first is None:
-            first = _next_step(magnitudes, common, model, path, present)
-            found = model.additions[present:]
-            if _takes_a_rare_one(found):
+            first = _next_step(magnitudes, common, model, path)
+            found = model.found
+            if len(found) < THRESHOLDS.most_at_once and not any(map(is_rare, found)):
                 first = with_rare_ones(magnitudes, effects, first, found)
         if not path and _none_leads(first):
             once = weighed(magnitudes, common, first, noises=1)
@@ -80,10 +71,10 @@ def _one_by_one(
             # the candidate's fit has shown a better one of the model without it
             model, path = fair, path[:-1]
             continue
-        needed = needed_gain(model.white, len(model.additions) - present)
+        needed = needed_gain(model.white, len(model.found))
         if done.best is None or done.best.gain < needed or len(path) > THRESHOLDS.few:
             # where the noise had to be taken larger, the model before the step is the one fitted with it
-            return without_the_superseded(magnitudes, path, done.before, present)
+            return without_the_superseded(magnitudes, path, done.before)
         magnitudes, larger = added(magnitudes, model, done.best)
         evenly = None if larger.white else evenly_fitted(as_fitted(done.before, done.best), band_of_steps(path), larger)
         if evenly and explains_too_little(done.sized, evenly, band_of_steps(path)):
@@ -92,10 +83,10 @@ def _one_by_one(
     return path, model
 
 
-def _followed(path: Sequence[SelectionStep], present: int) -> tuple[str, str] | None:
+def _followed(path: Sequence[SelectionStep]) -> tuple[str, str] | None:
     """Effect and target of the first addition, where a second one was looked for beside it."""
     looked_for = len(path) > 1 and any(one.fit for one in path[1].candidates)
-    return path[1].before.additions[present].key if looked_for else None
+    return path[1].before.found[0].key if looked_for else None
 
 
 def _explains_nearly_all(step: SelectionStep) -> bool:
@@ -115,12 +106,12 @@ def _none_leads(step: SelectionStep) -> bool:
 
 
 def _next_step(
-    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: Sequence[SelectionStep], present: int
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: Sequence[SelectionStep]
 ) -> SelectionStep:
     """All candidates for one more addition; only screened where none would be believed beside those found: beside a
     rare one or beyond two only one that leaves noise is, and none that removes next to nothing, but of what a real
     structure leaves, where the sensors' noise counts for little."""
-    found = model.additions[present:]
+    found = model.found
     rare = [one for one in found if is_rare(one)]
     only_to_noise = len(found) >= THRESHOLDS.most_at_once or rare
     far_from_noise = model.residuals.mean_square >= THRESHOLDS.real_structure
@@ -131,11 +122,6 @@ def _next_step(
         if step.leaves_noise or not in_vain:
             return step
     return only_screened(magnitudes, effects, model)
-
-
-def _takes_a_rare_one(found: Sequence[Addition]) -> bool:
-    """Whether one may be added to what was found."""
-    return len(found) < THRESHOLDS.most_at_once and not any(map(is_rare, found))
 
 
 def _all_explain_too_little(step: SelectionStep, path: Sequence[SelectionStep]) -> bool:

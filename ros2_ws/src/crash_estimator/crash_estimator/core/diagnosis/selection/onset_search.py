@@ -133,7 +133,7 @@ class _Search:
     ) -> tuple[Shift, ...]:  # fmt: skip
         """Where the motion with the first effect of a path begins, or what came nearest to one, or with others in its
         place; none where that leaves more than next to nothing, or, with as many effects, gains too little."""
-        present, best = path.final.additions[: path.present], path.steps[0].best
+        present, best = path.final.given, path.steps[0].best
         first = path.added[:1] or ([as_found(best)] if best else [])
         choices = [(*present, *one) for one in (first[: min(most, 1)], *others)]
         found = sharpened(begins, taken, path.structure, choices, self._observed, _left_by(path).rms)
@@ -156,13 +156,14 @@ class _Search:
         explained most, those that leave least from there on."""
         fitted = (one.addition for one in path.steps[0].as_recorded if one.fit)
         element = next((one.target for one in fitted if one.effect.acts_on == "element"), None)
-        records, present = self._observed(begins), path.final.additions[: path.present]
+        records, present = self._observed(begins), path.final.given
         magnitudes = measure_magnitudes(path.structure, records)
         laws: dict[tuple[str, str], Addition] = {}
         for one in candidates(magnitudes, self.effects, present):
             if one.target == element:
                 laws.setdefault((one.effect.name, one.variant), one)
-        fits = {key: fit(make_problem(magnitudes, records, (*present, law))) for key, law in laws.items()}
+        tried = ((key, law) for key, law in laws.items() if not search_is_over())
+        fits = {key: fit(make_problem(magnitudes, records, (*present, law))) for key, law in tried}
         leaves = {key: analyse(one).rms for key, one in fits.items()}
         return [[laws[key]] for key in sorted(leaves, key=leaves.__getitem__)[: THRESHOLDS.few]]
 

@@ -56,21 +56,6 @@ def two_of_one_effect(magnitudes: Magnitudes, model: Model, candidates: Sequence
     return found
 
 
-def as_expected(
-    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, expected: Sequence[Addition]
-) -> Pair | None:
-    """The first two that were found under other assumptions, where they leave next to nothing under these as well."""
-    if len(expected) < 2 or model.white:
-        return None
-    candidates = fit_candidates(magnitudes, effects, model)
-    first = next((one for one in _likely(candidates) if one.addition.key == expected[0].key), None)
-    if first is None:
-        return None
-    larger = added(magnitudes, model, first)[1]
-    pair = _together(magnitudes, candidates, model, first, larger, expected[1])
-    return near_the_floor([pair], candidates) if pair else None
-
-
 def _together(
     magnitudes: Magnitudes, candidates: Sequence[CandidateFit], model: Model, first: CandidateFit, larger: Model,
     second: Addition,

@@ -15,25 +15,26 @@ from .thresholds import THRESHOLDS
 
 
 def without_the_superseded(
-    magnitudes: Magnitudes, path: list[SelectionStep], final: Model, present: int
+    magnitudes: Magnitudes, path: list[SelectionStep], final: Model
 ) -> tuple[list[SelectionStep], Model]:
     """An effect added first may have stood for one that was found later: what the evidence can spare goes again.
 
     That is one of which noise is left without it, too, and which gains no more than chance; or which gains nothing.
     Where more than noise is left anyway, only what has ended at nothing is asked.
     """
-    number = present
-    while number < len(final.additions) - 1:
-        if not (final.white or _is_zero(final.additions[number], final.fit)):
+    given, number = final.given, 0
+    while number < len(final.found) - 1:
+        found = final.found
+        if not (final.white or _is_zero(found[number], final.fit)):
             number += 1
             continue
-        fewer = final.additions[:number] + final.additions[number + 1 :]
-        smaller = _refitted(magnitudes, fewer, final)
+        fewer = found[:number] + found[number + 1 :]
+        smaller = _refitted(magnitudes, given + fewer, final)
         if final.fit.evidence - smaller.fit.evidence > (THRESHOLDS.gain if smaller.white else 0.0):
             number += 1
             continue
-        path = path[: number - present] + path[number - present + 1 :]
-        models = [_refitted(magnitudes, fewer[: present + k], final) for k in range(len(path) - 1)] + [smaller]
+        path = path[:number] + path[number + 1 :]
+        models = [_refitted(magnitudes, given + fewer[:k], final) for k in range(len(path) - 1)] + [smaller]
         gains = [b.fit.evidence - a.fit.evidence for a, b in zip(models, models[1:], strict=False)] + [None]
         path = [_again(*each) for each in zip(path, models, gains, strict=True)]
         final = smaller
@@ -55,9 +56,7 @@ def _again(step: SelectionStep, before: Model, gain: float | None) -> SelectionS
     return step._replace(before=before, candidates=[best if gain is None else best._replace(gain=gain), *others])
 
 
-def up_to_the_least_error(
-    path: Sequence[SelectionStep], final: Model, present: int
-) -> tuple[list[SelectionStep], Model]:
+def up_to_the_least_error(path: Sequence[SelectionStep], final: Model) -> tuple[list[SelectionStep], Model]:
     """The steps, and the last model, up to the one that leaves the least, and while each addition is more than nothing.
 
     What leaves white noise stands as it is. In a noise as large as the misfit a fit can end where the evidence is
@@ -68,7 +67,7 @@ def up_to_the_least_error(
     models = [step.before for step in path]
     if models[-1] is not final:
         models.append(final)
-    told = sized_models(path, final)[: 1 + len(final.additions) - present]
+    told = sized_models(path, final)[: 1 + len(final.found)]
     errors = [in_band(one.fit, one.residuals, band_of_steps(path)).rms for one in told]
     last = errors.index(min(errors))
     last = next((k for k, step in enumerate(path[:last]) if _is_nothing(step, final)), last)

@@ -1,4 +1,5 @@
-"""Every tuned number of the model selection, with its unit, its reason, and what it was tuned on.
+"""What the model selection believes, and how much it tries: each number with its unit, its reason, and what it was
+tuned on. A number of one module alone stands in that.
 
 "Development cases" are simulated ones on seeds that no judging run uses (docs/missing-effects.md).
 """

@@ -135,14 +135,17 @@ def sharpened(
 ) -> Sharpened | None:  # fmt: skip
     """The likeliest shifts for the structure with the likeliest of some choices of additions; and what they gain over
     those `taken` with all that was found so, which left so much (rms, m/s^2). None where the first steps leave so much
-    that a closer look makes no noise of it."""
+    that a closer look makes no noise of it, or where the search is over: nothing would be looked for from there on."""
     taken = tuple(taken)
     bins = sum(record.bins * record.measured.shape[1] for record in observed(taken))
     starts = [MotionStart(onsets, structure, additions, observed, bins) for additions in choices]
-    start, near = min(((one, one.about(taken)) for one in starts), key=lambda pair: pair[0].roughly(pair[1]))
-    if start.left_about(near).mean_square >= CLOSER * THRESHOLDS.near_floor:
+    pairs = ((one, one.about(taken)) for one in starts if not search_is_over())
+    start, near = min(pairs, key=lambda pair: pair[0].roughly(pair[1]), default=(None, taken))
+    if search_is_over() or start.left_about(near).mean_square >= CLOSER * THRESHOLDS.near_floor:
         return None
     best = start.to_the_sample(near)
+    if search_is_over():
+        return None
     least, as_found = start.unlikely(best), start.of_both(taken, left)
     gain = 0.5 * (min(start.unlikely(taken), as_found) - least)
     of_residuals = 0.5 * (start.of_both(best, left) - least)

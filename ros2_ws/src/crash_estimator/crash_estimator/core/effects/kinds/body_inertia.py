@@ -57,8 +57,8 @@ class BodyInertia(Effect):
         of_one = WEIGHED if len(free) == 1 and not force_measured else 0.0
         return of_one + (LEFT_OUT if c < 0.0 else 0.0)
 
-    def is_doubt(self, structure, addition, c):
-        return abs(c) < WEIGHED_TO * self._mass(structure, addition)
+    def is_doubt(self, magnitudes, addition, c, shapes):
+        return abs(c) < WEIGHED_TO * self._mass(magnitudes.structure, addition)
 
     @staticmethod
     def _mass(structure, addition):
