@@ -108,6 +108,7 @@ EVERY_EFFECT = (
     EffectSpec("clearance", "mount", 0.005, variant="play"),
     EffectSpec("bottoming_out", "foam", 8.0e4, {"stop": 0.08}),
     EffectSpec("yielding", "foam", 3.0e4, {"yield_crush": 0.05}),
+    EffectSpec("yielding", "foam", 5.0e4, {"yield_crush": 0.05}, variant="plastic"),
     EffectSpec("plastic_unloading", "foam", 2.5e5),
     EffectSpec("load_path", "striker-wall", 1.0e4),
     EffectSpec("load_path", "striker-wall", 4.0e4, {"gap": 0.08}, variant="late"),
@@ -189,13 +190,20 @@ def test_so_they_are_where_the_spring_is_spent(effect, what, recording):
     assert_derivatives_agree(on_a_line(effect, what), recording, NEAR[effect.type])
 
 
+def test_so_they_are_by_a_stiffness_that_is_also_a_line_s_slope(recording):
+    open_ = Coefficient(FOAM[0], estimated=True, shape="constant")
+    bent = EffectSpec("yielding", "foam", 5.0e4, {"yield_crush": 0.05}, variant="plastic")
+    assert_derivatives_agree(structure(bent, stiffness=open_), recording, NEAR["yielding"])
+
+
 def assert_derivatives_agree(model: Structure, recording: Recording, near: float) -> None:
     problem, point = problem_of(model, recording)
     (experiment,) = problem.experiments
     equations = linearise(experiment, point.theta, point.trajectories[0])
     by_equations = whitened(experiment, point.theta, point.trajectories[0], equations)[:, :, 1:]
     record, (term,) = experiment.record, problem.layout.terms
-    for parameter in (term.coefficient, *term.shapes.values()):
+    constants = [link.constant for link in problem.layout.links if link.constant is not None]
+    for parameter in (term.coefficient, *term.shapes.values(), *constants):
         step = 1e-4 * max(abs(point.theta[parameter]), 1e-6)
         moved = []
         for sign in (1.0, -1.0):

@@ -45,6 +45,7 @@ def written(found: Diagnosis, model: str, folder) -> Structure:
         ("sled/cubic.inside/0.5g/clean/71700003", "in_curve", "nothing"),
         ("wall/cubic.beside/0.5g/clean/71700004", "", "springs"),
         ("side/damper.metered/1g/clean/71700005", "metered", "nothing"),
+        ("cab/limit.plastic/1g/clean/71900000", "plastic", "nothing"),
     ],
 )
 def test_the_form_of_a_law_is_found_and_can_be_read_back(name, form, contacts, tmp_path):
@@ -68,7 +69,7 @@ def test_the_form_of_a_law_is_found_and_can_be_read_back(name, form, contacts, t
 
 def test_a_law_that_another_one_imitates_is_named_beside_it():
     """A spring behind a dry slider that slips once is an unloading line: both leave noise, and both are said."""
-    _, found = found_in("wall/hysteresis.slider/1g/clean/71000002")
+    _, found = found_in("wall/hysteresis.slider/1g/clean/71000004")
     first = found.ranking[0]
     said = {first.effect, *(name.partition(" on ")[0] for name in first.confounded_with)}
     assert said == {"plastic_unloading", "hysteresis"}

@@ -93,11 +93,11 @@ def _characteristic(
         force = np.where(apart, 0.0, (force - parallel) / factor - inside)
     squares = float(np.sum(rate[~apart] ** 2))
     damping = float(np.sum((damper * rate**2)[~apart])) / squares if squares else element.damping.value
-    if element.stiffness.shape == "constant" and element.unloading is None:
+    if element.stiffness.shape == "constant":
         stiffness = after[-1].parameters[description.parameters.index(f"{element.name}.stiffness")]
         reach = np.array([-1.0, 0.0, 1.0]) * (float(np.abs(crush).max(initial=0.0)) or 1e-3)
         force = _as_it_can(element, stiffness * reach)
-        return Characteristic(element.name, reach, force, None, damping, element.tension, True)
+        return Characteristic(element.name, reach, force, element.unloading, damping, element.tension, True)
     slope = _unloading(element, crush, force)
     if slope is None:  # all samples lie on one curve, in tension too
         x, f = _curve(crush[~apart], force[~apart])

@@ -95,6 +95,7 @@ FORMS: dict[str, Form] = {
     "cubic.inside": Form("cubic_stiffness", CONTACTS, sizes.inside(sizes.cubic), straight=True, lined=True),
     "limit.flat": Form("yielding", CONTACTS, sizes.changed(sizes.limited), straight=True, elastic=True),
     "limit.line": Form("yielding", CONTACTS, sizes.changed(sizes.limited), straight=True, lined=True),
+    "limit.plastic": Form("yielding", CONTACTS, sizes.changed(sizes.bent), straight=True, elastic=True),
     "limit.knee": Form("yielding", ELEMENTS, sizes.changed(sizes.kneed), straight=True, elastic=True),
     "limit.foam": Form("yielding", CONTACTS, sizes.changed(sizes.foamy), straight=True),
     "gap.one": Form(

@@ -84,6 +84,11 @@ def limited(base: Base) -> dict:
     return {"curve": Limited(base.joint.curve, k * at, at)}
 
 
+def bent(base: Base) -> dict:
+    """The same, of which the crush beyond stays: it springs back as stiff as it was."""
+    return limited(base) | {"unload": base.joint.curve.force(1.0)}
+
+
 def kneed(base: Base) -> dict:
     """Beyond the knee a tenth to a third of its stiffness is left."""
     k, at = base.joint.curve.force(1.0), base.share(0.3, 0.5) * base.peak.x

@@ -5,7 +5,9 @@ As large as the element's own stiffness k it is a force limiter, with a plateau 
 curve of two slopes. Of an element whose stiffness is known no more is lost than it has. A free curve of an elastic
 element contains it, so it is offered where the element's stiffness is one constant or known, or unloads along a line.
 The way back is the way that it came; form `in_curve`: it is a part of the spring's own curve, and unloads along the
-same line.
+same line. Form `plastic`, of a force limiter that stays bent, as a belt's or a sheet's: from the largest crush so far
+it springs back as stiff as it was at first. `hysteresis` says the same of a small part of an element's force, as of a
+dry slider behind a spring, which yields on the way back as well.
 """
 
 from dataclasses import dataclass
@@ -13,6 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from .base import ElementForce, ElementMotion, Shape
+from .kinds.element_force import PLASTIC
+
+MAIN_PART = 0.4
+"""Of the largest force of an element, that it must yield at to be called plastic: of two names of one law, the one that
+says what most of the force does."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +29,11 @@ class Loss(ElementForce):
     def limits(self, magnitudes, addition):
         stiffness = magnitudes.structure.elements[magnitudes.element(addition.target)].stiffness
         return self.low, self.high if stiffness.estimated else stiffness.value
+
+    def is_doubt(self, magnitudes, addition, c, shapes):
+        yields_at = c * shapes["yield_crush"]  # N
+        largest = magnitudes.force[magnitudes.element(addition.target)]
+        return addition.variant == PLASTIC and yields_at < MAIN_PART * largest
 
 
 def force(motion: ElementMotion, yield_crush: float):
@@ -34,5 +46,6 @@ EFFECT = Loss(
     {"yield_crush": Shape("m", 0.03, 0.97, (0.1, 0.3, 0.6), of_crush=True)},
     force=force,
     of_crush_only=True,
+    lasting=True,
 )
 """Limits of `yield_crush` as of a stop, and lower: a limiter yields early."""

@@ -104,9 +104,10 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
             parameters += [term.coefficient, *term.shapes.values()]
             columns += [static * h, *(static * c * d for d in by_shape)]
         force, kx, kp, weight = static * factor, kx * factor, kp * factor, weight * factor[:, None]
+    by_stiffness = x if link.plastic else at  # the line's slope is the same parameter
     if link.curve is None and link.constant is not None:
         parameters.append(link.constant)
-        columns.append(at * carries * factor)
+        columns.append(by_stiffness * carries * factor)
     if link.gap is not None:
         parameters.append(link.gap)
         columns.append(-law.gap * kx)
@@ -148,7 +149,8 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
             # on the unloading line it is the spring's force that opens the contact: what changes it, moves the instant
             opens = np.where(on_line, found.gate_slope * contact.force / max(law.slope, 1.0), 0.0)
             weight, kp = weight + opens[:, None] * found.weight, kp + opens * found.kp
-            moved = {link.constant: at} | {p: column for one in inside for p, column in zip(*one[2:], strict=True)}
+            moved = {p: column for one in inside for p, column in zip(*one[2:], strict=True)}
+            moved[link.constant] = by_stiffness
             columns = [c + opens * moved.get(p, 0.0) for p, c in zip(parameters, columns, strict=True)]
     side = np.sign(crush) if law.play else 1.0
     for term in link.in_law:
@@ -175,7 +177,7 @@ def _law(link: Link, theta: np.ndarray) -> Law:
         curve = link.curve.knots, np.where(link.curve.column >= 0, theta[link.curve.column], 0.0), link.curve.column
     elif link.constant is not None:
         stiffness = theta[link.constant]
-    slope = link.unloading
+    slope = stiffness if link.plastic else link.unloading
     gap = 0.0 if link.gap is None else float(np.exp(theta[link.gap]))
     law = Law(gap, False, slope is not None, float(slope or 0.0), *curve, float(stiffness), not link.tension)
     for term in link.in_law:

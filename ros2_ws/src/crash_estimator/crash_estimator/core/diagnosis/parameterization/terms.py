@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects.effect import Addition, Effect
-from ...effects.kinds.element_force import IN_CURVE
+from ...effects.kinds.element_force import OF_THE_CURVE, PLASTIC
 from ...structure_parts import NOTHING, outlasts
 from .free_curve import Curve
 
@@ -62,12 +62,17 @@ class Link:
     @cached_property
     def parallel(self) -> tuple[Term, ...]:
         """Forces beside the spring."""
-        return tuple(t for t in self.terms if t.addition.effect.in_parallel and t.addition.variant != IN_CURVE)
+        return tuple(t for t in self.terms if t.addition.effect.in_parallel and t.addition.variant not in OF_THE_CURVE)
 
     @cached_property
     def in_curve(self) -> tuple[Term, ...]:
         """Functions of the crush that belong to the spring's own curve."""
-        return tuple(t for t in self.terms if t.addition.effect.in_parallel and t.addition.variant == IN_CURVE)
+        return tuple(t for t in self.terms if t.addition.effect.in_parallel and t.addition.variant in OF_THE_CURVE)
+
+    @cached_property
+    def plastic(self) -> bool:
+        """From its peak it unloads as stiff as it is before any of those."""
+        return any(term.addition.variant == PLASTIC for term in self.in_curve)
 
     @cached_property
     def remembering(self) -> tuple[Term, ...]:

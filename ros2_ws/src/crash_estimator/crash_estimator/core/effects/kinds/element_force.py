@@ -8,10 +8,14 @@ from typing import ClassVar
 
 import numpy as np
 
+from ...structure import CONTACT_FREQUENCY
 from ..effect import Addition, Effect
-from ..estimator_model import ROUGHLY, coefficient_of, element_index, typical_motion, with_action
+from ..estimator_model import ROUGHLY, coefficient_of, element_index, typical_motion, with_action, with_element
 
 IN_CURVE = "in_curve"
+PLASTIC = "plastic"
+OF_THE_CURVE = IN_CURVE, PLASTIC
+
 HALF = 0.5
 """A coefficient's prior standard deviation carries this share of its target's largest force: as large as an effect
 that a model can lack and still be one of that crash; the evidence changes by ln 2 for a factor of two."""
@@ -23,28 +27,35 @@ class ElementForce(Effect):
 
     force(motion: ElementMotion, **shape constants) -> (g,) N per unit of the coefficient
 
-    Variants, of a function of the crush alone on an element that unloads along a line of its own: it is a spring beside
-    that one (""), or a part of its curve, which unloads along the line ("in_curve").
+    Variants of a function of the crush alone: it is a spring beside the element's own (""); or a part of that one's
+    curve, and unloads along the line that it has ("in_curve"), or, of a `lasting` one on an element of constant
+    stiffness that has none, along a line of that stiffness ("plastic").
     """
 
     force: Callable[..., np.ndarray] | None = None
-    doubles: str = ""  # the element's own coefficient that says the same: none is offered where that is estimated
+    doubles: str = ""  # the element's own coefficient that says the same as the usual form: where that is estimated
+    # only other forms are offered
+    lasting: bool = False  # what it changes of a spring may stay when that springs back
 
     function: ClassVar[str] = "force"
     in_parallel: ClassVar[bool] = True
 
     @property
     def variants(self):
-        return ("", IN_CURVE) if self.of_crush_only else super().variants
+        of_crush = ("", IN_CURVE, PLASTIC) if self.lasting else ("", IN_CURVE)
+        return of_crush if self.of_crush_only else super().variants
 
     def put_to_work(self, structure, test, spec):
         k, force = element_index(structure, spec.target), partial(self.force, **spec.shape)
+        if spec.variant == PLASTIC:
+            slope = structure.elements[k].stiffness.value or structure.reduced_mass(k) * CONTACT_FREQUENCY**2
+            structure = with_element(structure, spec.target, unloading=slope)
         typical = typical_motion(structure, k)
         moved = np.abs(force(typical))
         scale = ROUGHLY * float(typical.static[0]) / float(moved[moved > 0.0][0] if moved.any() else 1.0)
         return with_action(
             structure, spec, self.unit, "element", k, coefficient_of(spec, self), scale, force=force,
-            of_crush_only=self.of_crush_only, in_curve=spec.variant == IN_CURVE,
+            of_crush_only=self.of_crush_only, in_curve=spec.variant in OF_THE_CURVE,
         )  # fmt: skip
 
     def candidates(self, structure, magnitudes):
@@ -52,9 +63,10 @@ class ElementForce(Effect):
             free_curve = element.stiffness.estimated and element.stiffness.shape == "curve"
             # a free curve of an elastic element contains a function of the crush alone
             contained = self.of_crush_only and free_curve and not element.unloading
-            if not (contained or (self.doubles and getattr(element, self.doubles).estimated)):
-                beside_only = self.of_crush_only and (free_curve or not element.unloads)
-                for variant in ("",) if beside_only else self.variants:
+            doubled = bool(self.doubles and getattr(element, self.doubles).estimated)
+            for variant in self.variants:
+                needs = {IN_CURVE: element.unloads and not free_curve, PLASTIC: not (element.unloads or free_curve)}
+                if not (contained or (doubled and not variant)) and needs.get(variant, True):
                     yield from on_element(self, magnitudes, element.name, variant)
 
     def prior_std(self, magnitudes, addition):
