@@ -106,6 +106,20 @@ def test_a_shape_constant_of_another_form_is_one_clear_error(tmp_path):
         ready_with(tmp_path, "elements:", pushed)
 
 
+CURVE, CONSTANT = "min: 0.0}   # N/m", "min: 0.0, shape: constant}   # N/m"
+BENT = "effects:\n  - {type: yielding, element: car_barrier, form: plastic}\nelements:"
+
+
+@pytest.mark.parametrize("stiffness", [CURVE, CONSTANT + "\n    unloading: 9.0e5"])
+def test_what_stays_bent_has_one_stiffness_and_no_line(tmp_path, stiffness):
+    file = tmp_path / "model.yaml"
+    file.write_text(model_path("frontal_single").read_text().replace(CURVE, stiffness).replace("elements:", BENT))
+    with pytest.raises(ModelError, match="yielding on car_barrier: form 'plastic' is of an element of one constant"):
+        load_model(file, EFFECTS)
+    file.write_text(model_path("frontal_single").read_text().replace(CURVE, CONSTANT).replace("elements:", BENT))
+    assert load_model(file, EFFECTS).effects[0].variant == "plastic"
+
+
 def test_a_request_to_a_running_estimator_names_the_form_as_a_model_file_does():
     model, pushed = load_model("frontal_single"), EffectSpec("constant_force", "car", 100.0, {"rise": 0.01})
     request = request_of(replace(pushed, variant="rising"))

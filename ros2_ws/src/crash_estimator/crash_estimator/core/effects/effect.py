@@ -114,6 +114,9 @@ class Effect:
         """All that it can act on; None: any channel that the model does not use, of a test that is not known."""
         return [element.name for element in structure.elements]
 
+    def refuse(self, structure: Structure, spec: EffectSpec) -> None:
+        """Raises ModelError, one line, where a model's entry cannot be meant as it is written."""
+
     def stated_limits(self) -> tuple[float, float]:
         """Of the coefficient as a model file states it."""
         return self.low, self.high

@@ -55,6 +55,7 @@ def checked(structure: Structure, spec: EffectSpec, effects: Mapping[str, Effect
         name = getattr(spec, role)
         if name is not None and name not in bodies:
             raise ModelError(f"{what} on {spec.target}: {role} must be a body, got {name!r}; {_choice(name, bodies)}")
+    effect.refuse(structure, spec)
     return effect
 
 

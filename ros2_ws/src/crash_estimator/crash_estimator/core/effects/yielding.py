@@ -19,7 +19,7 @@ from .kinds.element_force import PLASTIC
 
 MAIN_PART = 0.4
 """Of the largest force of an element, that it must yield at to be called plastic: of two names of one law, the one that
-says what most of the force does."""
+says what most of the force does. The dry sliders of both simulators take 0.12 to 0.35."""
 
 
 @dataclass(frozen=True)

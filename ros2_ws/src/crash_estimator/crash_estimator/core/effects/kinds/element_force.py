@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...structure import CONTACT_FREQUENCY
+from ...structure import CONTACT_FREQUENCY, ModelError
 from ..effect import Addition, Effect
 from ..estimator_model import ROUGHLY, coefficient_of, element_index, typical_motion, with_action, with_element
 
@@ -33,8 +33,7 @@ class ElementForce(Effect):
     """
 
     force: Callable[..., np.ndarray] | None = None
-    doubles: str = ""  # the element's own coefficient that says the same as the usual form: where that is estimated
-    # only other forms are offered
+    doubles: str = ""  # the element's coefficient that the usual form doubles: where it is estimated, others are left
     lasting: bool = False  # what it changes of a spring may stay when that springs back
 
     function: ClassVar[str] = "force"
@@ -44,6 +43,15 @@ class ElementForce(Effect):
     def variants(self):
         of_crush = ("", IN_CURVE, PLASTIC) if self.lasting else ("", IN_CURVE)
         return of_crush if self.of_crush_only else super().variants
+
+    def refuse(self, structure, spec):
+        element = structure.elements[element_index(structure, spec.target)]
+        if spec.variant == PLASTIC and (element.unloads or _is_curve(element)):
+            raise ModelError(
+                f"model {structure.name}: effect {spec.type} on {spec.target}: form {PLASTIC!r} is of an element of "
+                f"one constant stiffness without a line: give it `shape: constant` and no `unloading`, or take "
+                f"form {IN_CURVE!r}"
+            )
 
     def put_to_work(self, structure, test, spec):
         k, force = element_index(structure, spec.target), partial(self.force, **spec.shape)
@@ -60,7 +68,7 @@ class ElementForce(Effect):
 
     def candidates(self, structure, magnitudes):
         for element in magnitudes.crushed_elements():
-            free_curve = element.stiffness.estimated and element.stiffness.shape == "curve"
+            free_curve = _is_curve(element)
             # a free curve of an elastic element contains a function of the crush alone
             contained = self.of_crush_only and free_curve and not element.unloading
             doubled = bool(self.doubles and getattr(element, self.doubles).estimated)
@@ -75,6 +83,11 @@ class ElementForce(Effect):
         reach = [np.abs(self.force(motion, **addition.shapes)) for motion in motions]
         largest = max(values[np.isfinite(values)].max(initial=0.0) for values in reach)
         return HALF * magnitudes.force[element] / max(largest, 1e-12)
+
+
+def _is_curve(element) -> bool:
+    """Whether its force is a free function of the crush."""
+    return element.stiffness.estimated and element.stiffness.shape == "curve"
 
 
 def on_element(effect: Effect, magnitudes, element: str, variant: str = ""):
