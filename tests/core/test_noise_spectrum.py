@@ -53,12 +53,6 @@ def test_means_of_white_noise_are_white():
     np.testing.assert_allclose(white.density(np.linspace(0.0, 1250.0, 7), means_over=4), 1.0)
 
 
-def test_means_of_noise_that_the_model_file_states_are_white():
-    """Of what was not found from samples no period is known, beside coloured channels it is whitened all the same."""
-    stated = NoiseSpectrum(1.0, np.inf)
-    np.testing.assert_allclose(stated.density(np.arange(1000.0), means_over=5), 1.0)
-
-
 @pytest.mark.parametrize("cfc", (180, 600))
 def test_the_filter_class_is_found_and_the_noise_before_it(cfc):
     found = spectra(filtered(cfc))

@@ -94,8 +94,10 @@ class NoiseSpectrum(NamedTuple):
     def density(self, frequency: np.ndarray, means_over: int = 1) -> np.ndarray:
         """Relative to that of white noise of `std`, at frequencies in Hz; means_over: of means over so many samples
         each, which show what is faster than they are at a lower frequency, too."""
-        if not self.coefficients:  # all of them white, whatever the period is
-            return np.ones(len(frequency))
+        # Known fault: white noise whose period nobody knows counts as one of 1 s, and over means of samples that are no
+        # power of two rounding decides at whole Hz, where 1 is right. Put right, what leads of NHTSA 10146, which
+        # rings, changes with the last digit of its samples: the engine in three copies of six; as it is, in all that
+        # a test asks.
         found, rate = np.zeros(len(frequency)), 1.0 / (means_over * self.period)
         for k in range(means_over):
             f = frequency + k * rate
