@@ -45,8 +45,10 @@ class ElementForce(Effect):
         return of_crush if self.of_crush_only else super().variants
 
     def refuse(self, structure, spec):
+        if spec.variant != PLASTIC:
+            return
         element = structure.elements[element_index(structure, spec.target)]
-        if spec.variant == PLASTIC and (element.unloads or _is_curve(element)):
+        if element.unloads or _is_curve(element):
             raise ModelError(
                 f"model {structure.name}: effect {spec.type} on {spec.target}: form {PLASTIC!r} is of an element of "
                 f"one constant stiffness without a line: give it `shape: constant` and no `unloading`, or take "
