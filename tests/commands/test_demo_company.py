@@ -84,3 +84,10 @@ def test_the_replay_may_end_by_itself_and_others_when_they_are_let_go(scene):
     scene.company.let_go.add("mrls")
     assert scene.pass_time(GRACE + 2, "replay", "mrls") == []
     assert not scene.company.there("replay") and not scene.company.lost
+
+
+@pytest.mark.parametrize(("status", "lost"), [(0, []), (2, ["replay has ended too early: its reason"])])
+def test_a_replay_that_says_by_its_status_that_nothing_is_missing_needs_no_last_word(scene, status, lost):
+    """On a machine with much to do that comes after its process has ended, by more than a second."""
+    scene.children["replay"].status = status
+    assert scene.pass_time(GRACE + 2, "replay", "mrls") == lost

@@ -68,7 +68,8 @@ class Company:
     def _why_lost(self, name: str, now: float) -> str:
         child = self.children[name]
         if child.status is not None:
-            ends_itself = name == "replay" and self._has_left(name)  # its status is about what the others lack
+            # its status is about what the others lack; where they lack nothing, its last word may come late
+            ends_itself = name == "replay" and (child.status == 0 or self._has_left(name))
             if name in self.let_go or ends_itself:
                 self.ended_well.add(name)
                 return ""
