@@ -17,7 +17,7 @@ import numpy as np
 from .base import ElementForce, ElementMotion, Shape
 from .kinds.element_force import PLASTIC
 
-MAIN_PART = 0.4
+MAIN_PART = 0.5
 """Of the largest force of an element, that it must yield at to be called plastic: of two names of one law, the one that
 says what most of the force does. The dry sliders of both simulators take 0.12 to 0.35."""
 
