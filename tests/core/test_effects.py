@@ -21,7 +21,7 @@ from crash_estimator.model_file import load_model
 
 VOCABULARY = """viscous_damping quadratic_damping coulomb_friction hysteresis maxwell_element gas_cushion
 rate_hardening added_stiffness cubic_stiffness clearance bottoming_out yielding plastic_unloading load_path added_mass
-unmodelled_body constant_force guide_friction initial_velocity channel_delay channel_gain channel_offset
+unmodelled_body constant_force guide_friction gravity initial_velocity channel_delay channel_gain channel_offset
 force_offset""".split()
 DAMPERS = ("viscous_damping", "quadratic_damping", "coulomb_friction")
 FORCES = [effect for effect in EFFECTS.values() if isinstance(effect, ElementForce)]
@@ -113,9 +113,9 @@ def test_the_logarithmic_rate_doubles_the_force_too_and_counts_from_its_referenc
 
 def test_the_limits_are_physical():
     """Damping and a spring beside never negative; a delay within 1 ms, gains and stated speeds within 10 %, offsets
-    5 g; a body may be heavier than stated, or lighter, and a stated spring stiffer, or softer."""
+    5 g; a body may be heavier than stated, or lighter, and a stated spring stiffer, or softer; it may fall or rise."""
     stated = {"added_mass", "added_stiffness", "constant_force", "initial_velocity"}
-    signed = stated | {"channel_gain", "channel_offset", "force_offset"}
+    signed = stated | {"channel_gain", "channel_offset", "force_offset", "gravity"}
     assert {name for name, effect in EFFECTS.items() if effect.low < 0.0} == signed
     assert EFFECTS["channel_delay"].high == pytest.approx(1e-3)
     assert (EFFECTS["channel_gain"].low, EFFECTS["channel_gain"].high) == pytest.approx((-0.1, 0.1))

@@ -8,9 +8,12 @@ from helpers_paths import BAGS
 
 from crash_estimator.core.clipping import clipped
 from crash_estimator.core.diagnosis import diagnose
+from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.sensor_faults import without_faults
+from crash_estimator.core.structure import Body, Coefficient, Element, Structure
 from crash_estimator.model_file import load_model
 from crash_replay.bag import read_bag
-from crash_replay.recording import Recording
+from crash_replay.recording import Channel, Recording, Test
 
 
 def at_most(recording: Recording, channel: str, share: float) -> Recording:
@@ -34,6 +37,17 @@ def test_what_is_clipped_is_found_and_nothing_else(padded):
     beyond = np.abs(values) >= end
     np.testing.assert_array_equal(lost, beyond)
     assert not any(clipped(column).any() for column in padded.values.T)
+
+
+@pytest.mark.parametrize("noise", [0.5, 2.0])
+def test_a_level_that_noise_would_not_leave_is_the_end_of_the_range_also_where_it_is_reached_gently(noise):
+    """A pulse that rises by less than a step from one sample to the next, noise in steps."""
+    step, rng = 2.0, np.random.default_rng(9)
+    pulse = 150.0 * np.sin(np.pi * np.clip(np.arange(3000) / 2000, 0.0, 1.0)) + rng.normal(0.0, noise * step, 3000)
+    recorded = np.round(np.clip(pulse, None, 130.0) / step) * step
+    lost = clipped(recorded)
+    np.testing.assert_array_equal(lost, recorded == 130.0)
+    assert lost.sum() > 300 and not clipped(np.round(pulse / step) * step).any()
 
 
 def test_holes_numbers_of_coarse_steps_and_what_has_no_noise_are_not_clipped():
@@ -78,3 +92,48 @@ def test_the_recording_that_was_given_stays_as_it_is(padded):
     before = given.values.copy()
     diagnose(replace(load_model("side_dummy")), [given])
     np.testing.assert_array_equal(given.values, before)
+
+
+RIGHT, LEFT, SPRING, SPEED = 1200.0, 300.0, 2e6, 12.0  # kg, kg, N/m, m/s
+HEAD_ON = Structure(
+    "head-on",
+    (Body("right", RIGHT, ("right_ax",)), Body("left", LEFT, ("left_ax",))),
+    (Element("fronts", ("right", "left"), Coefficient(1e6, estimated=True, min=0.0), tension=False),),
+)
+
+
+def head_on(end: float) -> Recording:
+    """Two cars of which the light one's sensor ends at a share of its peak."""
+    time, reduced = np.arange(-400, 1000) * 1e-4, RIGHT * LEFT / (RIGHT + LEFT)
+    rate = np.sqrt(SPRING / reduced)
+    force = SPRING * SPEED / rate * np.sin(np.clip(rate * time, 0.0, np.pi))
+    values = np.column_stack([-force / RIGHT, force / LEFT])
+    values += np.random.default_rng(3).normal(0.0, 3.0, values.shape)
+    values[:, 1] = np.minimum(values[:, 1], end * force.max() / LEFT)
+    channels = tuple(Channel(f"{name}_ax", "acceleration", name, "x") for name in ("right", "left"))
+    test = Test("head-on", channels, initial_velocity={"right": SPEED, "left": 0.0})
+    return Recording(test, np.rint(time * 1e9).astype(int), values)
+
+
+def speed_reached(structure: Structure, recording: Recording) -> float:
+    """m/s, of the light car, as its channel says once what is clipped has been left out."""
+    (mended,), _ = without_faults([recording])
+    record = observe(structure, mended)
+    return float(record.dt @ record.signals["left_ax"].on_grid)
+
+
+SPEED_REACHED = 2.0 * SPEED * RIGHT / (RIGHT + LEFT)  # m/s, of an elastic impact
+
+
+def test_while_a_sensor_is_at_its_end_the_body_moves_as_its_momentum_says():
+    """By straight lines the speed is a third too low, and with it every crush is wrong."""
+    recording = head_on(0.4)
+    assert speed_reached(HEAD_ON, recording) == pytest.approx(SPEED_REACHED, rel=0.01)
+    assert diagnose(HEAD_ON, [recording]).verdict == "adequate"
+
+
+def test_else_as_a_cubic_through_what_is_beside_the_gap():
+    """By straight lines a quarter of the half-sine's area is lost."""
+    driven = replace(HEAD_ON.bodies[0], driven=True, mass=None)
+    of_one = replace(HEAD_ON, bodies=(driven, HEAD_ON.bodies[1]))
+    assert speed_reached(of_one, head_on(0.6)) == pytest.approx(SPEED_REACHED, rel=0.06)

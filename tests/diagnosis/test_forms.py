@@ -75,6 +75,13 @@ def test_a_law_that_another_one_imitates_is_named_beside_it():
     assert said == {"plastic_unloading", "hysteresis"}
 
 
+def test_contacts_that_leave_noise_to_three_effects_only_are_assumed_otherwise():
+    """A damper that never pulls: rate hardening, friction and a wrong speed follow it, under another contact."""
+    _, found = found_in("wall/damper.deepening/2g/clean/39000081")
+    (step,) = found.steps
+    assert (found.complete, step.effect, step.form) == (True, "viscous_damping", "hunt_crossley"), found.text
+
+
 def test_dampers_that_pull_until_the_crush_is_gone_are_those_of_our_own_bag(tmp_path):
     """The simulator's dampers act both ways, and its springs unload along a line, of which the model file has none."""
     bag = read_bag(ROOT / "bags" / "frontal_single.mcap")

@@ -28,7 +28,7 @@ from crash_replay.synthetic.hidden.cases import draw_case
 
 THAT_REMEMBER = {"maxwell_element", "gas_cushion"}
 RARE = THAT_REMEMBER | {"guide_friction", "force_offset"}
-IN_RARE_FORMS = {"rate_hardening", "viscous_damping", "quadratic_damping"}
+IN_RARE_FORMS = {"rate_hardening", "viscous_damping", "quadratic_damping", "coulomb_friction"}
 SPEEDS = (0.75, 1.1)
 
 

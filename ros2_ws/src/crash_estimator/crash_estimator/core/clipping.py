@@ -1,10 +1,8 @@
 """Samples at the end of a sensor's range: they say no more than that the truth lies beyond."""
 
-from collections.abc import Sequence
+from math import erf, sqrt
 
 import numpy as np
-
-from crash_replay.recording import Recording
 
 from .differences import by_differences
 
@@ -14,6 +12,8 @@ steps of its numbers are finer than that."""
 STEPS = 3.0
 """Of a channel's numbers, by which it must have come to its extreme with one sample: the top of a smooth peak that is
 level for RUN samples has a step of one, or two, beside it."""
+CHANCE = 1e-3
+"""Probability that some samples of a level top are the same number for so long: below it the range ends there."""
 FINER = 1e-5
 """Of the largest value: a channel whose noise is less has none, and what is level in it may be the truth."""
 FEWEST = 40
@@ -28,12 +28,13 @@ def clipped(values: np.ndarray) -> np.ndarray:
     valid = np.isfinite(values)
     if not valid.any():
         return found
-    for extreme in (np.nanmax(values), np.nanmin(values)):
-        there = values == extreme
-        if _stays(there) and _comes_suddenly(values, there):
-            found |= there
-    rest = values[valid & ~found]
+    extremes = [there for extreme in (np.nanmax(values), np.nanmin(values)) if _stays(there := values == extreme)]
+    rest = values[valid & ~np.any([found, *extremes], axis=0)]
     noise = by_differences(rest) if len(rest) >= FEWEST else 0.0
+    step = np.diff(np.unique(values[valid])).min(initial=np.inf)
+    for there in extremes:
+        if _is_no_chance(there, noise / step) or _comes_suddenly(values, there, step):
+            found |= there
     believed = noise > FINER * np.nanmax(np.abs(values)) and found.mean() < MOST
     return found if believed else np.zeros(len(values), dtype=bool)
 
@@ -42,28 +43,23 @@ def _stays(there: np.ndarray) -> bool:
     return np.convolve(there, np.ones(RUN), "valid").max(initial=0.0) >= RUN
 
 
-def _comes_suddenly(values: np.ndarray, there: np.ndarray) -> bool:
+def _is_no_chance(there: np.ndarray, noise: float) -> bool:
+    """Whether noise, in steps of the channel's numbers, would not let a level top be the same number for so long."""
+    same = erf(0.5 / (noise * sqrt(2.0))) if noise else 1.0  # the largest probability that any number can have
+    longest = max((stop - start for start, stop in _runs(there)), default=0)
+    return len(there) * same**longest < CHANCE
+
+
+def _runs(there: np.ndarray) -> np.ndarray:
+    """(m, 2) first sample of each run, and the one after its last."""
+    return np.flatnonzero(np.diff(np.concatenate([[0], there.view(np.int8), [0]]))).reshape(-1, 2)
+
+
+def _comes_suddenly(values: np.ndarray, there: np.ndarray, step: float) -> bool:
     """Whether a sample beside any run of RUN is more than STEPS of the channel's own away."""
-    step = np.diff(np.unique(values[np.isfinite(values)])).min(initial=np.inf)
-    runs = np.flatnonzero(np.diff(np.concatenate([[0], there.view(np.int8), [0]]))).reshape(-1, 2)
+    runs = _runs(there)
     for start, stop in runs[runs[:, 1] - runs[:, 0] >= RUN]:
         beside = values[[k for k in (start - 1, stop) if 0 <= k < len(values)]]
         if np.nanmax(np.abs(beside - values[start]), initial=0.0) > STEPS * step:
             return True
     return False
-
-
-def without_clipped(recordings: Sequence[Recording]) -> tuple[list[Recording], str]:
-    """With holes where an acceleration or a force is clipped, and a line that says so; "" where none is."""
-    found, said = [], []
-    for recording in recordings:
-        values = recording.values.copy()
-        for k, channel in enumerate(recording.test.channels):
-            lost = clipped(values[:, k]) if channel.quantity in ("acceleration", "force") else np.zeros(0, dtype=bool)
-            if lost.any():
-                values[lost, k] = np.nan
-                said.append(
-                    f"{channel.name} of {recording.test.id} is clipped, {np.count_nonzero(lost)} samples left out"
-                )
-        found.append(Recording(recording.test, recording.time_ns, values))
-    return found, "; ".join(said)

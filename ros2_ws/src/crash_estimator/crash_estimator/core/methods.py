@@ -102,18 +102,20 @@ def make_estimator(  # noqa: PLR0913 - everything that an estimator can be told
     if preset not in PRESETS:
         raise ModelError(f"there is no preset {preset!r}, only {', '.join(PRESETS)}")
     errors = known_errors(structure, test, effects)
-    if errors is not None:
-        applied(
-            structure, test, effects
-        )  # says what is wrong with any of them, before those of the channels are taken out
-        left = tuple(e for e in structure.effects if e.coefficient is None or not effects[e.type].distorts)
-        structure = replace(structure, effects=left)
-        return Corrected(
-            make_estimator(
-                structure, test, method, damping_after, effective_mass, compiled, effects, preset, **settings
-            ),
-            errors,
-        )
+    if errors is None:
+        return _made(structure, test, method, damping_after, effective_mass, compiled, effects, preset, settings)
+    applied(structure, test, effects)  # says what is wrong with any of them, before the channels are mended
+    left = tuple(e for e in structure.effects if e.coefficient is None or not effects[e.type].only_distorts)
+    mended = replace(structure, effects=left)
+    inner = _made(mended, test, method, damping_after, effective_mass, compiled, effects, preset, settings)
+    return Corrected(inner, errors)
+
+
+def _made(  # noqa: PLR0913 - likewise
+    structure: Structure, test: Test, method: str, damping_after: float | None, effective_mass: bool, compiled: bool,
+    effects: Mapping[str, Effect], preset: str, settings: dict[str, Any],
+) -> AnyEstimator:  # fmt: skip
+    """As `make_estimator`, for samples that are free of the channels' known errors."""
     if effective_mass or method == "effective_mass":
         _check_masses_alone(structure, effects)
     if effective_mass and method != "effective_mass":
@@ -122,7 +124,7 @@ def make_estimator(  # noqa: PLR0913 - everything that an estimator can be told
         return MassFirst(
             structure,
             masses,
-            lambda s: make_estimator(s, test, method, damping_after, False, compiled, effects, preset, **settings),
+            lambda s: _made(s, test, method, damping_after, False, compiled, effects, preset, settings),
         )
     recipe = METHODS[method]
     known = [f.name for f in fields(recipe.kind) if f.init and f.name != "settings"]

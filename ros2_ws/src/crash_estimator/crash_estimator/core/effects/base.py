@@ -15,12 +15,15 @@ from .kinds import (
     Gap,
     GuideForce,
     PairSpring,
+    SlidingForce,
     StatedSpring,
     StaticFactor,
     UnloadingSlope,
+    Weight,
 )
 
 __all__ = [
     "Addition", "AttachedBody", "BodyForce", "BodyInertia", "BodyStart", "ChannelError", "Effect", "ElementForce",
-    "ElementMotion", "Gap", "GuideForce", "PairSpring", "Shape", "StatedSpring", "StaticFactor", "UnloadingSlope",
+    "ElementMotion", "Gap", "GuideForce", "PairSpring", "Shape", "SlidingForce", "StatedSpring", "StaticFactor",
+    "UnloadingSlope", "Weight",
 ]  # fmt: skip

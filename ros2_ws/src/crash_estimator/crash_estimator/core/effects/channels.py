@@ -49,11 +49,13 @@ def known_errors(structure: Structure, test: Test, effects: Mapping[str, Effect]
         effect = effects.get(spec.type)
         if effect is None or not effect.distorts or spec.coefficient is None:
             continue
-        channel, any_known = test.index(spec.target, f"effect {spec.type}"), True
-        if effect.distorts == "offset":
-            offsets.append(Offset(channel, effect, spec.variant, spec.coefficient))
-        else:
-            getattr(found, effect.distorts)[channel] += spec.coefficient
+        any_known = True
+        for name in effect.channels(structure, spec.target):
+            channel = test.index(name, f"effect {spec.type}")
+            if effect.distorts == "offset":
+                offsets.append(Offset(channel, effect, spec.variant, spec.coefficient))
+            else:
+                getattr(found, effect.distorts)[channel] += spec.coefficient
     return found._replace(offsets=tuple(offsets)) if any_known else None
 
 

@@ -100,6 +100,15 @@ class Effect:
         """What it makes wrong of a channel: delay, gain or offset."""
         return ""
 
+    def channels(self, structure: Structure, target: str) -> Sequence[str]:
+        """Those that it makes wrong, where it makes any."""
+        return (target,)
+
+    @property
+    def only_distorts(self) -> bool:
+        """With the channels mended nothing is left of it."""
+        return bool(self.distorts) and self.acts_on == "channel"
+
     @property
     def is_of_the_recording(self) -> bool:
         """Not the structure is wrong, but what was measured or stated of its motion."""
@@ -174,7 +183,9 @@ class Effect:
         """
         return None
 
-    def own_link(self, addition: "Addition", index: Mapping[str, int], starts: Sequence[np.ndarray]) -> OwnLink | None:
+    def own_link(
+        self, addition: "Addition", structure: Structure, index: Mapping[str, int], starts: Sequence[np.ndarray]
+    ) -> OwnLink | None:
         """A link of its own; index: of the bodies, the ground's too; starts: displacement (b,) m of the bodies at time
         zero of each recording."""
         return None
@@ -184,8 +195,9 @@ class Effect:
         return {}
 
     def body_load(
-        self, addition: "Addition", time: np.ndarray, inertial: Callable[[str], np.ndarray], **shapes: float
-    ) -> tuple[str, np.ndarray] | None:
+        self, addition: "Addition", structure: Structure, time: np.ndarray, inertial: Callable[[str], np.ndarray],
+        **shapes: float,
+    ) -> tuple[str, np.ndarray] | None:  # fmt: skip
         """A body, and the force (g,) N on it for one unit; inertial(channel): acceleration (g,) of an attached body."""
         return None
 

@@ -36,7 +36,7 @@ class Distortion(NamedTuple):
 
 def distortion(layout: Layout, theta: np.ndarray, channel: str) -> Distortion:
     found = Distortion()
-    for term in (t for t in layout.terms if t.addition.target == channel):
+    for term in (t for t in layout.terms if channel in t.addition.effect.channels(layout.structure, t.addition.target)):
         p, value = term.coefficient, float(theta[term.coefficient])
         match term.addition.effect.distorts:
             case "gain":

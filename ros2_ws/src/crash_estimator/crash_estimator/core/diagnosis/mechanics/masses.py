@@ -48,7 +48,7 @@ def body_loads(
     layout: Layout, theta: np.ndarray, record: ObservedRecord, inertial: Callable[[str], np.ndarray]
 ) -> Iterator[BodyLoad]:
     for term in layout.terms:
-        load = partial(term.addition.effect.body_load, term.addition, record.time, inertial)
+        load = partial(term.addition.effect.body_load, term.addition, layout.structure, record.time, inertial)
         found = load(**term.shapes_at(theta))
         if found is not None:
             body, force = found

@@ -18,6 +18,7 @@ from ...kinematics import Kinematics, zero_crush
 from ...noise_spectrum import NoiseSpectrum
 from ...sensor_noise import sensor_noise
 from ...structure import ModelError, Structure
+from .gaps import through_gaps
 from .grid import bins_of, grid_of, on_grid
 from .pace import longest_step
 from .rest import Rest, bridged, rests_of, seen_early_by
@@ -208,6 +209,10 @@ def observe(structure: Structure, recording: Recording, rest: Rest | None = None
             name, x = body.acceleration[0], signals[body.displacement]
             path = CubicSpline(x.time, smoothed(x.values, recording.sample_period).value)
             signals[name] = signals[name]._replace(on_grid=tracked_acceleration(time, path, *start[:, k]))
+        for name in body.acceleration if body.free else ():
+            if not np.isfinite(recording.column(name)[after]).all():
+                values = through_gaps(structure, body.name, recording, name, signals[name].values)
+                signals[name] = signals[name]._replace(on_grid=np.interp(time, recording.time, values))
     seen = [(o, signals[o.channel], np.isfinite(recording.column(o.channel))) for o in outputs]
     measured = np.stack([np.where(valid, signal.values, np.nan)[after] for _, signal, valid in seen], axis=1)
     given = [structure.bodies[o.body].noise for o in outputs]

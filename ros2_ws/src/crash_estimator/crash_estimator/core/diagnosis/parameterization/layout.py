@@ -114,17 +114,18 @@ def make_layout(
             touching.append((addition, curve))
     knots = len(b.parameters)
     links, terms = [], []
-    for k, element in enumerate(structure.elements):
-        links.append(_element_link(b, k, element, index, curves[k], magnitudes, additions, terms))
     starts = [record.initial_displacement for record in records]
-    for addition in additions:
-        own = addition.effect.own_link(addition, index, starts)
-        if own is not None:
+    own = [addition.effect.own_link(addition, structure, index, starts) for addition in additions]
+    beside = [addition for addition, link in zip(additions, own, strict=True) if link is None]
+    for k, element in enumerate(structure.elements):
+        links.append(_element_link(b, k, element, index, curves[k], magnitudes, beside, terms))
+    for addition, link in zip(additions, own, strict=True):
+        if link is not None:
             terms.append(_term(b, addition, magnitudes))
-            term = terms[-1]
+            term, name = terms[-1], f"{addition.target}.{addition.effect.name}"
             spring = {"constant": term.coefficient, "gap": term.shapes.get("gap")}
-            what = spring if own.spring else {"terms": (term,)}
-            links.append(Link(addition.target, own.ends, own.ends, own.tension, origin=own.origin, **what))
+            what = spring if link.spring else {"terms": (term,)}
+            links.append(Link(name, link.ends, link.ends, link.tension, origin=link.origin, **what))
     for addition, curve in touching:
         links.append(
             Link(

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 from crash_replay.recording import Recording
 
-from ...clipping import without_clipped
 from ...derived_motion import with_accelerations
 from ...effects import EFFECTS
 from ...effects.effect import Addition, Effect
+from ...sensor_faults import without_faults
 from ...structure import ModelError, Structure
 from ..observation.record import refuse_dead_channels
 from ..residuals.in_band import in_band
@@ -104,7 +104,7 @@ def diagnose(
     """
     if not recordings:
         raise ModelError("a diagnosis needs at least one recording")
-    recordings, clipped = without_clipped(recordings)
+    recordings, faults = without_faults(recordings)
     structure, recordings = with_accelerations(structure, recordings)
     for recording in recordings:
         refuse_dead_channels(structure, recording)
@@ -112,7 +112,7 @@ def diagnose(
         begun = select_from_the_onset(structure, recordings, effects)
         stopped = search_is_over()
     found = _answer(structure, begun.path, tolerance, begun.zero)
-    remarks = [clipped] if clipped else []
+    remarks = [faults] if faults else []
     elsewhere = {shift.test: shift.seconds for shift in begun.unused if shift.off(0.0)}  # whatever a filter shows early
     if elsewhere:
         remarks.append(signals_begin(elsewhere))

@@ -146,7 +146,8 @@ def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedR
         misfit = 0.5 * max(as_recorded.cost - cost_of_noise(records), 0.0)  # nats
         if otherwise.evidence > as_recorded.evidence + THRESHOLDS.gain + THRESHOLDS.least_share * misfit:
             most = max(most, otherwise.evidence)
-    return most if not final.white or most > path.as_recorded.evidence else -np.inf
+    in_question = not final.white or len(path.added) > THRESHOLDS.most_at_once
+    return most if in_question or most > path.as_recorded.evidence else -np.inf
 
 
 def _likely(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]]:

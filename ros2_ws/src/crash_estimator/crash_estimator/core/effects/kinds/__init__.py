@@ -10,11 +10,13 @@ from .gap import Gap
 from .guide_force import GuideForce
 from .pair_spring import PairSpring
 from .remembering_force import RememberingForce
+from .sliding_force import SlidingForce
 from .stated_spring import StatedSpring
 from .static_factor import StaticFactor
 from .unloading_slope import UnloadingSlope
+from .weight import Weight
 
 __all__ = [
     "AttachedBody", "BodyForce", "BodyInertia", "BodyStart", "ChannelError", "ElementForce", "Gap", "GuideForce",
-    "PairSpring", "RememberingForce", "StatedSpring", "StaticFactor", "UnloadingSlope",
+    "PairSpring", "RememberingForce", "SlidingForce", "StatedSpring", "StaticFactor", "UnloadingSlope", "Weight",
 ]  # fmt: skip

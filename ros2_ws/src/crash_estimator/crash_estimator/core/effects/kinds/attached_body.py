@@ -51,7 +51,7 @@ class AttachedBody(Effect):
     def mass_shares(self, addition):
         return {addition.taken_from: -1.0} if addition.taken_from else {}
 
-    def body_load(self, addition, time, inertial, **shapes):
+    def body_load(self, addition, structure, time, inertial, **shapes):
         return addition.host, -inertial(addition.target)
 
     def candidates(self, structure, magnitudes):

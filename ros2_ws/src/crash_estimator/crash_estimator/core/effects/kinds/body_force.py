@@ -49,7 +49,7 @@ class BodyForce(Effect):
         scale = ROUGHLY * structure.bodies[k].mass * CONTACT_FREQUENCY**2 * TYPICAL_CRUSH
         return with_action(structure, spec, self.unit, "body", k, coefficient_of(spec, self), scale, force=force)
 
-    def body_load(self, addition, time, inertial, **shapes):
+    def body_load(self, addition, structure, time, inertial, **shapes):
         return addition.target, self.force(time, **shapes)
 
     def candidates(self, structure, magnitudes):

@@ -31,7 +31,7 @@ class GuideForce(ElementForce):
         guided = replace(structure, bodies=(*structure.bodies, *ground), elements=(*structure.elements, guide))
         return super().put_to_work(guided, test, replace(spec, target=guide.name))
 
-    def own_link(self, addition, index, starts):
+    def own_link(self, addition, structure, index, starts):
         return OwnLink((index[addition.target], index[GROUND]), tension=True, origin=(), spring=False)
 
     def candidates(self, structure, magnitudes):

@@ -33,7 +33,9 @@ class PairSpring(Effect):
 
     def put_to_work(self, structure, test, spec):
         start = initial_motion(structure, test)[0]
-        link = self.own_link(Addition(self, spec.target, variant=spec.variant), structure.body_index, [start])
+        link = self.own_link(
+            Addition(self, spec.target, variant=spec.variant), structure, structure.body_index, [start]
+        )
         element = Element(
             spec.target,
             tuple(structure.bodies[k].name for k in link.ends),
@@ -43,7 +45,7 @@ class PairSpring(Effect):
         )
         return replace(structure, elements=(*structure.elements, element))
 
-    def own_link(self, addition, index, starts):
+    def own_link(self, addition, structure, index, starts):
         ends = ends_of(addition.target, index)
         if addition.variant.endswith("_back"):
             ends = ends[::-1]
