@@ -54,6 +54,7 @@ CONTACTS = {
 }
 TWO_WAY = {"side": ("rib_spine",), "sled": ("block_sled",)}
 ELEMENTS = {name: (*CONTACTS[name], *TWO_WAY.get(name, ())) for name in CONTACTS}
+SEATED = {name: CONTACTS[name] for name in ("side", "sled")}
 BODIES = {"cab": ("cab", "engine"), "side": ("rib", "spine"), "sled": ("impactor", "block", "sled")}
 """Without the one mass before a barrier: its mass, its gain and the barrier's are one factor, and a delay is hardly
 seen."""
@@ -79,6 +80,7 @@ FORMS: dict[str, Form] = {
         ("hysteresis",),
     ),
     "friction.lugre": Form("coulomb_friction", ELEMENTS, sizes.beside(sizes.lugre), ("hysteresis",)),
+    "friction.seat": Form("coulomb_friction", SEATED, sizes.seat),
     "stop.beside": Form(
         "bottoming_out", CONTACTS, sizes.beside(lambda b: branches.SpringBeside(sizes.stop(b))), straight=True
     ),

@@ -69,6 +69,13 @@ def lugre(base: Base) -> branches.Branch:
     return branches.LuGre(f, base.share(1.15, 1.4) * f, 0.05 * p.v, s0, 0.02 * f / p.v, 0.0)
 
 
+def seat(base: Base) -> Setup:
+    """One body slides on the other, whether the element between them carries or not."""
+    joint = base.joint
+    slides = branches.TanhFriction(base.share(0.12, 0.25) * base.peak.f, 0.02 * base.peak.v)
+    return base.setup.with_joint("hidden", Joint(joint.a, joint.b, Straight(0.0), one_way=False, branches=(slides,)))
+
+
 def stop(base: Base, power: float = 1.0) -> Stop:
     at = base.share(0.55, 0.75) * base.peak.x
     return Stop(at, base.share(0.35, 0.6) * base.peak.f / (base.peak.x - at) ** power, power)

@@ -101,13 +101,14 @@ def solve(
     low, high = prior.low - theta, prior.high - theta
     held = np.zeros(layout.size, bool) if held is None else held.copy()
     delta = np.zeros(layout.size)
-    for _ in range(8):
+    for _ in range(8):  # each holds at least one more at its limit; the next linearisation may let it go again
         free = ~held
         target = vector - matrix @ np.where(held, delta, 0.0)
         moving = np.flatnonzero(free)
         small = matrix.take(moving, 0).take(moving, 1) * scale[moving] * scale[moving, None]
         factor = cholesky(small)
         delta[free] = scale[free] * cho_solve(factor, scale[free] * target[free], check_finite=False)
+        # by more than a rounding error
         outside = free & ((delta < low - 1e-12 * np.abs(low)) | (delta > high + 1e-12 * np.abs(high)))
         if not outside.any():
             break

@@ -180,6 +180,7 @@ def _element_curve(b: Builder, k: int, element, magnitudes: Magnitudes, roughnes
 
 
 def _constant(b: Builder, name: str, coefficient: Coefficient, std: float) -> int:
+    """A constant of an element; a fit begins with a tenth of its scale, where it acts already and claims little."""
     low, high = coefficient.min, coefficient.max
     return b.add(name, min(max(std * 0.1, low), high), std, low=low, high=high)
 
@@ -188,6 +189,7 @@ def _element_link(b, k, element, index, curve, magnitudes, additions, terms) -> 
     stiffness, damping = element.stiffness, element.damping
     constant = rate = None
     if stiffness.estimated and curve is None:
+        # wide: what else carries beside it may push the other way, and a wide prior costs a nat; not varied
         constant = _constant(b, f"{element.name}.stiffness", stiffness, 3.0 * magnitudes.stiffness[k])
     if damping.estimated:
         rate = _constant(b, f"{element.name}.damping", damping, magnitudes.force[k] / magnitudes.rate[k])

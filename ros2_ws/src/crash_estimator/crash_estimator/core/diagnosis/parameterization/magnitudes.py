@@ -25,6 +25,10 @@ is less), or its scale of stiffness becomes absurd. Ours: halved and doubled the
 nothing of 36 looked-at cases."""
 
 
+SLOWEST = 1e-3
+"""m/s: of an element that hardly moves. Only forces are divided by it: it has to be above 0, not right."""
+
+
 FAST = 5.0
 """m/s: a rate of crush for which an effect's limits hold as they stand. Where the largest one is less, so are they: a
 friction that comes to its force near the largest rate of all is a damper. Of five carts that were let go by hand it
@@ -92,7 +96,7 @@ class Magnitudes(NamedTuple):
 
     def touching_damping(self, addition) -> float:
         """Scale of a damper beside that curve, N s/m."""
-        body, rate = self.structure.body_index[addition.touches], 1e-3
+        body, rate = self.structure.body_index[addition.touches], SLOWEST
         for record, measured in zip(self.records, self.measured):
             v = measured.v[:, body] - attached_motion(self.structure, record, addition)[1]
             rate = max(rate, float(np.abs(v).max()))
@@ -145,7 +149,7 @@ def measure_magnitudes(
             pushed = max(float(np.abs(record.signals[body.applied].values).max()) for record in records)
             body_force[k] = max(body_force[k], pushed) if rows else pushed
     elements = range(len(structure.elements))
-    crush_range, rate = np.zeros((len(elements), 2)), np.full(len(elements), 1e-3)
+    crush_range, rate = np.zeros((len(elements), 2)), np.full(len(elements), SLOWEST)
     for k in elements:
         for record, trajectory in zip(records, measured):
             motion = element_motion(structure, record, trajectory, k)

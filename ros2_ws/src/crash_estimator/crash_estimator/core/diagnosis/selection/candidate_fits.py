@@ -72,6 +72,7 @@ def fit_candidates(
         search.from_motion(Screened(a, 0.0, 0.0, 1.0) for a in bend)
     if thorough and not model.white:
         ways = search.slowly, search.other_variants, search.anew, search.profile
+        # of what explains little in the sensors' noise, far above it, all but the profile over its instant
         of_little = ways[: 3 if model.residuals.mean_square >= THRESHOLDS.real_structure else 1]
         for harder in ways:
             if search_is_over() or search.reached_the_floor():
