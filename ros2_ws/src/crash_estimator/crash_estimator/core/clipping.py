@@ -45,19 +45,25 @@ def _stays(there: np.ndarray) -> bool:
 
 def _is_no_chance(there: np.ndarray, noise: float) -> bool:
     """Whether noise, in steps of the channel's numbers, would not let a level top be the same number for so long."""
+    longest = max((stop - start for start, stop in runs_of(there)), default=0)
+    return chance_of_run(int(longest), len(there), noise) < CHANCE
+
+
+def chance_of_run(length: int, samples: int, noise: float) -> float:
+    """Of so many samples in a row that are the same number, somewhere among all, at most; noise: in steps of the
+    numbers."""
     same = erf(0.5 / (noise * sqrt(2.0))) if noise else 1.0  # the largest probability that any number can have
-    longest = max((stop - start for start, stop in _runs(there)), default=0)
-    return len(there) * same**longest < CHANCE
+    return samples * same**length
 
 
-def _runs(there: np.ndarray) -> np.ndarray:
+def runs_of(there: np.ndarray) -> np.ndarray:
     """(m, 2) first sample of each run, and the one after its last."""
     return np.flatnonzero(np.diff(np.concatenate([[0], there.view(np.int8), [0]]))).reshape(-1, 2)
 
 
 def _comes_suddenly(values: np.ndarray, there: np.ndarray, step: float) -> bool:
     """Whether a sample beside any run of RUN is more than STEPS of the channel's own away."""
-    runs = _runs(there)
+    runs = runs_of(there)
     for start, stop in runs[runs[:, 1] - runs[:, 0] >= RUN]:
         beside = values[[k for k in (start - 1, stop) if 0 <= k < len(values)]]
         if np.nanmax(np.abs(beside - values[start]), initial=0.0) > STEPS * step:

@@ -1,4 +1,4 @@
-"""Samples in which a sensor does not show what it feels: at the end of its range, and spikes."""
+"""Samples in which a sensor does not show what it feels: at the end of its range, dead, and spikes."""
 
 from collections.abc import Sequence
 
@@ -7,6 +7,7 @@ import numpy as np
 from crash_replay.recording import Recording
 
 from .clipping import clipped
+from .dropouts import dropouts
 from .spikes import spikes
 
 
@@ -18,10 +19,13 @@ def without_faults(recordings: Sequence[Recording]) -> tuple[list[Recording], st
         for k, channel in enumerate(recording.test.channels):
             if channel.quantity not in ("acceleration", "force"):
                 continue
+            recorded = recording.values[:, k]
             for what, lost in (
-                ("is clipped", clipped(values[:, k])),
-                ("has spikes", spikes(recording.values[:, k], recording.sample_period)),
+                ("is clipped", clipped(recorded)),
+                ("is dead for a while", dropouts(recorded)),
+                ("has spikes", spikes(recorded, recording.sample_period)),
             ):
+                lost &= np.isfinite(values[:, k])
                 if lost.any():
                     values[lost, k] = np.nan
                     said.append(
