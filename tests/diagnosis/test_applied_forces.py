@@ -221,3 +221,22 @@ def test_a_channel_without_samples_is_one_line(model, channel, valid, said):
 def test_which_bodies_take_which_channels_is_said(model, body, said):
     with pytest.raises(Exception, match=said):
         model(AXIS.replace("{mass: 40.0, applied: motor_fx, displacement: axis_x}", body))
+
+
+def test_a_force_whose_zero_a_short_rest_tells_is_not_taken_for_another_force(model):
+    """Its 20 samples at rest say the zero to 0.007 N, which pushes the axis by more than the noise of its velocity."""
+    rng, mass, damping, rest = np.random.default_rng(8), 40.0, 80.0, 20
+    time = np.arange(-rest, 2000) * 1e-3
+    force = np.where(time >= 0.0, 30.0 * np.sin(2.0 * np.pi * 1.1 * time), 0.0)
+    at = CubicSpline(time, force)
+    way = solve_ivp(
+        lambda t, v: (at(t) - damping * v) / mass, (0.0, time[-1]), [0.0], "DOP853", time[rest:], rtol=1e-9, atol=1e-12
+    )
+    velocity = np.concatenate([np.zeros(rest), way.y[0]]) + rng.normal(0.0, 1e-4, len(time))
+    noise = rng.normal(0.0, 0.03, len(time))
+    noise[:rest] += 0.0134 - noise[:rest].mean()  # two standard deviations of that mean
+    given = recording("axis", time, axis_v=("velocity", velocity), motor_fx=("force", force + noise))
+    found = diagnose(model(AXIS.replace("displacement: axis_x", "velocity: axis_v")), [given])
+
+    assert found.verdict == "adequate", found.text
+    assert all(one.evidence < 6.0 for one in found.ranking if one.effect == "constant_force")

@@ -217,6 +217,25 @@ def test_no_time_zero_is_sought_where_the_model_as_stated_leaves_noise(monkeypat
     assert onset_search._Search(None, (), {}).from_sharper_onsets(Begun(nothing, None, elsewhere)) is None
 
 
+@pytest.mark.parametrize(("gain", "told"), [(50.0, True), (-19.0, False)])
+def test_a_time_zero_from_which_a_model_leaves_noise_but_no_less_is_not_told(monkeypatch, gain, told):
+    """An axis that lacks nothing was told one with -19 nats."""
+    elsewhere = (Shift(0, "test", -4e-3, 1e-4, 1e-4),)
+    before = SimpleNamespace(white=False)
+    stated = SimpleNamespace(final=before, added=(), noise=False, steps=[SimpleNamespace(before=before)])
+    moved = SimpleNamespace(final=SimpleNamespace(white=True), added=(), noise=True)
+    zero = SimpleNamespace(gain=lambda of: gain, shifts=elsewhere)
+    search = onset_search._Search
+    monkeypatch.setattr(onset_search, "onsets", lambda recordings, early: elsewhere)
+    monkeypatch.setattr(onset_search, "_leaves_far_more", lambda path: False)
+    monkeypatch.setattr(search, "_observed", lambda self: [])
+    monkeypatch.setattr(search, "_at_onsets", lambda self, *given: elsewhere)
+    monkeypatch.setattr(search, "_rest_until", lambda self, there: True)
+    monkeypatch.setattr(search, "_begun", lambda self, *given: Begun(moved, zero))
+    found = search(None, (), {}).from_sharper_onsets(Begun(stated, None, elsewhere))
+    assert found == (Begun(moved, zero) if told else None)
+
+
 @pytest.mark.parametrize(("moves", "rests"), [(0.0, True), (3.0, False)])
 def test_what_moves_before_an_onset_is_not_left_out(monkeypatch, moves, rests):
     """100 samples from the stated time zero on, to an onset that is said to come 10 ms later; noise of 2 m/s^2."""

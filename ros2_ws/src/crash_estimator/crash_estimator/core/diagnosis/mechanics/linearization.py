@@ -87,9 +87,9 @@ def linearise(
         actions.act(term.coefficient, k, inverse[k] * force)
         for parameter, column in zip(term.shapes.values(), by_shapes, strict=True):
             actions.act(parameter, k, inverse[k] * c * column)
-    for k, body in enumerate(layout.structure.bodies):
-        if body.applied:
-            loads[:, k] += record.signals[body.applied].on_grid
+    for k, parameter in layout.zeros[r].items():
+        loads[:, k] += record.signals[layout.structure.bodies[k].applied].on_grid + theta[parameter]
+        actions.act(parameter, k, np.full(len(record.time), inverse[k]))
     rows = loads * inverse
     rows[:, driven] = trajectory.a[:, driven]
     for k, parameter in layout.kicks[r].items():

@@ -37,7 +37,7 @@ def _let_go(stages: int, last: float, less_believed: float) -> Schedule:
     return tuple(Stage(rate, less_believed * rate, ramp) for rate, ramp in zip(rates, ramps, strict=True))
 
 
-FROM_MEASURED_MOTION: Schedule = (*_let_go(3, 30.0, 0.15), FROM_SIMULATION[-1])
+FROM_MEASURED_MOTION: Schedule = (*_let_go(3, 20.0, 0.15), FROM_SIMULATION[-1])
 """Of a fit that starts from the measured motion."""
 
 SMALL_STEPS: Schedule = (*_let_go(16, 3.0, 1.5), *FROM_SIMULATION)

@@ -99,4 +99,5 @@ def embedding(base: Layout, wide: Layout) -> np.ndarray:
         for body in base.modes[r]:
             found += wide.modes[r][body]
         found += [wide.kicks[r][body] for body in base.kicks[r]]
+        found += [wide.zeros[r][body] for body in base.zeros[r]]
     return np.array(found)

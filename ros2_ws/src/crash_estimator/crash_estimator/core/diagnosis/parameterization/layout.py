@@ -2,7 +2,7 @@
 
 Parameters stand in this order: forces at the curves' knots, then constants of elements and effects and errors of the
 masses, then for each recording the nuisances (errors and drifts of its outputs' zeros, slow errors of its driven
-motions, errors of the velocities that it starts with).
+motions, errors of the velocities that it starts with, errors of the zeros of forces that are applied).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -57,6 +57,7 @@ class Layout(NamedTuple):
     drifts: tuple[dict[int, int], ...]  # per record, in doubt: output that is an acceleration -> its zero at the end
     modes: tuple[dict[int, range], ...]  # per record: driven body -> its modes, the mean first
     kicks: tuple[dict[int, int], ...]  # per record: body that starts as its own channel says -> error of its velocity
+    zeros: tuple[dict[int, int], ...]  # per record: body that a measured force is applied to -> error of its zero, N
     weighed: dict[int, int]  # in doubt: free body -> relative error of its mass
     prior: Prior
     start: np.ndarray  # (p,)
@@ -143,7 +144,7 @@ def make_layout(
     weighed = _weighed(b, structure) if records[0].in_doubt else {}
     common = len(b.parameters)
     outputs = comparable(outputs_of(structure), structure, records)
-    offsets, drifts, modes, kicks = [], [], [], []
+    offsets, drifts, modes, kicks, zeros = [], [], [], [], []
     for r, record in enumerate(records):
         offsets.append(len(b.parameters))
         for q in range(len(outputs)):
@@ -151,9 +152,11 @@ def make_layout(
         drifts.append(_drifts(b, outputs, record) if record.in_doubt else {})
         modes.append(_modes(b, structure, record, attached))
         kicks.append(_kicks(b, structure, magnitudes.measured[r]))
+        pushed = [(k, record.signals[body.applied]) for k, body in enumerate(structure.bodies) if body.applied]
+        zeros.append({k: b.add("zero", 0.0, signal.offset_std) for k, signal in pushed})
     return Layout(
         structure, tuple(links), bodies, np.array(kind), outputs, knots, common, len(b.parameters), tuple(terms),
-        attached, tuple(offsets), tuple(drifts), tuple(modes), tuple(kicks), weighed, b.prior(),
+        attached, tuple(offsets), tuple(drifts), tuple(modes), tuple(kicks), tuple(zeros), weighed, b.prior(),
         np.array([one.start for one in b.parameters]), tuple(one.name for one in b.parameters[knots:common]),
     )  # fmt: skip
 

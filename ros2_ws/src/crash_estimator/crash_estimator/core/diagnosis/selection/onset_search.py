@@ -100,7 +100,11 @@ class _Search:
             asked, of = look, path
             if not there or not self._rest_until(there):
                 continue
-            tried.append(self._begun(there, as_stated))
+            begun = self._begun(there, as_stated)
+            alone = begun.zero if begun.path.noise and not begun.path.added else None
+            if alone and alone.gain(begun.path.final) < THRESHOLDS.gain:
+                return None  # noise is left, but no less than from the stated time zero on
+            tried.append(begun)
             if tried[-1].path.noise:
                 return (self._alone(tried[-1]) or tried[-1]) if len(tried[-1].path.added) <= most else None
             if _left_by(tried[-1].path).mean_square < _left_by(path).mean_square:
