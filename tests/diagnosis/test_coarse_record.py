@@ -1,6 +1,7 @@
 """A record in means over short bins: what it compares, and what their noise is."""
 
 import numpy as np
+import pytest
 import yaml
 from helpers_diagnosis import hidden_case, so_far
 from helpers_estimation import oscillator, oscillator_recording
@@ -9,6 +10,7 @@ from scipy.signal import lfilter
 from test_filtered_time_zero import MODEL, crash
 
 from crash_estimator.core.diagnosis.observation.bin_means import MOST_STEPS, in_bins
+from crash_estimator.core.diagnosis.observation.grid import bins_of
 from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.online.online_diagnosis import OnlineDiagnosis
 from crash_estimator.core.diagnosis.residuals.residuals import _white as white_residual
@@ -79,3 +81,17 @@ def test_bins_are_as_long_as_a_record_asks_for_up_to_its_very_last_sample():
     time_ns[-1] += 120_000_000
     record = observe(oscillator(), Recording(whole.test, time_ns, whole.values))
     assert round(record.noise[0] ** 2 / in_bins(record).noise[0] ** 2) == 10
+
+
+@pytest.mark.parametrize(("transformed", "bins"), [(True, 432), (False, 433)])
+def test_of_coloured_noise_there_are_as_many_bins_as_are_soon_transformed(transformed, bins):
+    """433 is prime: a cosine transform of so many takes five times as long. What is in no bin is not compared."""
+    time = np.arange(4 * 433) * 1e-4
+    bin_, valid, found = bins_of(time, np.arange(len(time)), np.ones((len(time), 2)), transformed=transformed)
+    assert found == bins and bin_.max() == bins - 1
+    assert_allclose(np.flatnonzero(valid[:, 0]), np.arange(1, 4 * bins))
+
+
+def test_a_short_record_keeps_all_its_bins():
+    time = np.arange(4 * 13) * 1e-4
+    assert bins_of(time, np.arange(len(time)), np.ones((len(time), 1)), transformed=True)[2] == 13

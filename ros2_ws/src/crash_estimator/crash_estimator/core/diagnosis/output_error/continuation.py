@@ -26,23 +26,23 @@ FROM_SIMULATION: Schedule = (Stage(0.0, 2.0, 6.0), Stage(0.0, 1.0, 2.0))
 """Of a fit that starts from a simulation of another model."""
 
 
-def _let_go(stages: int, last: float, less_believed: float) -> Schedule:
-    """An observer that is let go in so many stages, to `last` 1/s, and with it the contacts' ramp; the noise is taken
-    so many times as large as the observer counts.
+FROM_MEASURED_MOTION: Schedule = (
+    Stage(200.0, 30.0, 16.0), Stage(80.0, 10.0, 8.0), Stage(30.0, 3.0, 4.0), FROM_SIMULATION[-1],
+)  # fmt: skip
+"""Of a fit that starts from the measured motion. The first observer holds a body within a quarter period of the fastest
+crash (5 ms). A force that jumps at separation is felt by the fit only while it jumps: ramped, it is drawn to the right
+instant. With 63 and 20 in place of 80 and 30, 173 of 181 looked-at cases were told right, 172 with these; but of NHTSA
+10146, filtered, the engine was not named, which hangs on such roundings."""
 
-    The first one holds a body within a quarter period of the fastest crash (5 ms). A force that jumps at separation is
-    felt by the fit only while it jumps: ramped, it is drawn to the right instant.
-    """
-    rates, ramps = np.geomspace(200.0, last, stages), np.geomspace(16.0, 4.0, stages)
-    return tuple(Stage(rate, less_believed * rate, ramp) for rate, ramp in zip(rates, ramps, strict=True))
-
-
-FROM_MEASURED_MOTION: Schedule = (*_let_go(3, 20.0, 0.15), FROM_SIMULATION[-1])
-"""Of a fit that starts from the measured motion."""
-
-SMALL_STEPS: Schedule = (*_let_go(16, 3.0, 1.5), *FROM_SIMULATION)
-"""Where that has led nowhere, as a light body between stiff elements may: less is believed at first, so that less is
-fitted to a motion that is still wrong."""
+SMALL_STEPS: Schedule = (
+    *(
+        Stage(observer, 1.5 * observer, ramp)
+        for observer, ramp in zip(np.geomspace(200.0, 3.0, 16), np.geomspace(16.0, 2.0, 16), strict=True)
+    ),
+    *FROM_SIMULATION,
+)
+"""Where that has led nowhere, as a light body between stiff elements may: the observer is let go in small steps, and
+less is believed at first, so that less is fitted to a motion that is still wrong."""
 
 LARGE_NOISE: Schedule = tuple(stage._replace(inflate=100.0 * stage.inflate) for stage in FROM_MEASURED_MOTION)
 """Where not even that leads anywhere, as with a measured motion that errs by far."""
