@@ -33,7 +33,6 @@ FOAM, MOUNT = (8.0e4, 300.0), (1.5e5, 900.0)
 """N/m and N s/m: between striker and plate, which may part, and between plate and wall."""
 SPEED = 6.0
 """m/s: the foam is crushed by some 0.15 m, and the striker thrown back."""
-
 RATE = 10_000.0
 
 
@@ -218,16 +217,12 @@ def assert_derivatives_agree(model: Structure, recording: Recording, near: float
         assert np.linalg.norm(found - expected) < near * np.linalg.norm(expected), problem.layout.names[parameter]
 
 
-IN_BOTH_FREE_RUNS = [None, *(effect for effect in EVERY_EFFECT if not EFFECTS[effect.type].distorts)]
-ON_FOAM = [None, *(effect for effect in IN_BOTH_FREE_RUNS[1:] if effect.target == "foam")]
-"""Those beside whose force it makes a difference whether the foam's damper pulls."""
+IN_BOTH = [None, *(effect for effect in EVERY_EFFECT if not EFFECTS[effect.type].distorts)]
+PULLS_OR_NOT = [(e, pulls) for pulls in (True, False) for e in IN_BOTH if pulls or not e or e.target == "foam"]
+"""Effects in both free runs; with a damper of the foam's that does not pull, those beside whose force it counts."""
 
 
-@pytest.mark.parametrize(
-    ("effect", "pulls"),
-    [*((effect, True) for effect in IN_BOTH_FREE_RUNS), *((effect, False) for effect in ON_FOAM)],
-    ids=lambda it: shown(it) or str(it),
-)
+@pytest.mark.parametrize("effect, pulls", PULLS_OR_NOT, ids=lambda it: shown(it) or str(it))
 def test_the_two_free_runs_agree(effect, pulls, recording):
     """The diagnosis's simulation and the estimators' free run, of one model with the same constants."""
     model = structure(*([effect] if effect else []))
