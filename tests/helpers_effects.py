@@ -10,7 +10,7 @@ from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.model_file import ModelFile
 from crash_replay.recording import Recording
-from crash_replay.synthetic.hidden.cases import draw_case
+from crash_replay.synthetic.hidden.cases import HiddenCase, draw_case
 
 SEED, RATE, NOISE = 3, 2000.0, 0.5  # Hz, g: one draw of each, taken as it came
 SENSOR = {"m/s^2": NOISE * G, "N": 3000.0}
@@ -22,9 +22,14 @@ STRUCTURE = {"load_path": "dummy", "unmodelled_body": "single"}
 
 
 @cache
+def drawn(effect: str, structure: str, seed: int = SEED) -> HiddenCase:
+    return draw_case(structure, [effect], seed)
+
+
+@cache
 def hidden(effect: str, structure: str, seed: int = SEED):
     """-> the model without the effect, what was hidden, the recording, and whom it concerns besides its target."""
-    case = draw_case(structure, [effect], seed)
+    case = drawn(effect, structure, seed)
     recording, _ = case.record(1.0, NOISE, RATE)
     model = ModelFile.model_validate(dict(case.specimen.model)).structure()
     more = {}

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers_estimation import plain
+from helpers_paths import BAGS
 from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.core.compiled.layout import ROW, STATE, shapes
@@ -11,13 +12,12 @@ from crash_estimator.core.compiled.plan import MethodPlan, flat, make_method_pla
 from crash_estimator.core.compiled.views import method_of, plan_views, row_views, size_of, state_views
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.model_file import load_model
-from crash_replay.synthetic.recordings import SCENARIOS
+from crash_replay.bag import read_bag
 
 
 def compiled_form(name, method):
     """Of a ready model and its simulated test."""
-    recording, _ = SCENARIOS[name](3)
-    return make_estimator(load_model(name), recording.test, method, compiled=True)
+    return make_estimator(load_model(name), read_bag(BAGS / f"{name}.mcap").test, method, compiled=True)
 
 
 def test_the_views_are_those_of_the_layout():

@@ -16,7 +16,7 @@ TRUE = np.array([2.0e4, 50.0])
 NOISE = 5.0
 LATE = (200, 300, 399)
 """Samples looked at: 20, 30 and 40 ms; with the memories of 5 ms their errors have little in common."""
-SOONER = (150, 225, 299)
+SOONER = (120, 170, 219)
 """Of the methods that are not compiled, whose every sample takes a millisecond."""
 
 CASES = {  # method, its settings, repetitions, colour of the noise (d, a)

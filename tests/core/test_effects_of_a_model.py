@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from helpers_effects import SEED, hidden, last_of, parameter_of, place_of, with_it
+from helpers_effects import drawn, hidden, last_of, parameter_of, place_of, with_it
 from helpers_estimation import oscillator, oscillator_recording
 from numpy.testing import assert_allclose
 from ruamel.yaml import YAML
@@ -17,7 +17,6 @@ from crash_estimator.core.methods import make_estimator
 from crash_estimator.core.structure import ModelError
 from crash_estimator.model_file import load_model
 from crash_replay.bag import write_bag
-from crash_replay.synthetic.hidden.cases import draw_case
 from crash_replay.synthetic.hidden.vocabulary import VOCABULARY
 
 
@@ -96,7 +95,7 @@ def test_what_a_diagnosis_writes_is_estimated(monkeypatch, capsys, folder, effec
     place = place_of(effect)
     _, what, recording, _ = hidden(effect, place)
     spec = with_it(effect, place, what.coefficient).effects[-1]
-    content = dict(draw_case(place, [effect], SEED).specimen.model)
+    content = dict(drawn(effect, place).specimen.model)
     content = {**content, "effects": [dict(_entry(spec, EFFECTS[effect], list(content["bodies"])))]}
     model, bag = folder / f"{effect}.yaml", folder / f"{effect}.mcap"
     with model.open("w") as file:
@@ -120,7 +119,7 @@ def test_what_a_diagnosis_writes_is_estimated(monkeypatch, capsys, folder, effec
 def test_a_small_coefficient_is_printed_with_its_digits(monkeypatch, capsys, folder):
     _, what, recording, _ = hidden("channel_gain", "frontal")
     model, bag = folder / "gain.yaml", folder / "gain.mcap"
-    content = dict(draw_case("frontal", ["channel_gain"], SEED).specimen.model)
+    content = dict(drawn("channel_gain", "frontal").specimen.model)
     with model.open("w") as file:
         YAML(typ="safe").dump({**content, "effects": [{"type": "channel_gain", "channel": what.target}]}, file)
     write_bag(recording, bag)

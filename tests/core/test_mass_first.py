@@ -27,6 +27,8 @@ def heavier(structure, factor):
 
 @pytest.mark.parametrize("method", ["mrls", "constrained_kalman", "afmm"])
 def test_wrong_masses_of_the_model_are_replaced(recording, method):
+    kept = recording.time_ns < 80_000_000
+    recording = replace(recording, time_ns=recording.time_ns[kept], values=recording.values[kept])
     right = load_model("frontal_engine_cab")
     wrong = heavier(right, 1.3)
     results = {}

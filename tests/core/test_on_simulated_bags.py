@@ -1,5 +1,7 @@
 """What the estimators find on the bundled recordings, against the simulator's truth."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from helpers_paths import BAGS
@@ -22,6 +24,7 @@ MODELS = {
 CARRIES = 1000.0  # N: peak forces are held against the truth above this
 
 
+@cache
 def followed(name, method, model=None):
     """-> structure, estimator's description, estimates of the bundled bag, the simulator's truth."""
     recording = read_bag(BAGS / f"{name}.mcap")

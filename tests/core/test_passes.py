@@ -33,9 +33,9 @@ def test_it_settles_and_a_further_pass_changes_nothing():
 
 
 def test_settled_is_no_farther_from_the_truth_than_one_pass():
-    """The mean square of 12 errors in K: one pass counts its first samples little, and with a wrong noise model."""
+    """The mean square of 8 errors in K: one pass counts its first samples little, and with a wrong noise model."""
     one, settled = [], []
-    for seed in range(12):
+    for seed in range(8):
         recording = record(seed)
         for most, errors in ((1, one), (MOST_PASSES, settled)):
             last = settle(maker(recording), recording, most).estimates[-1]

@@ -72,7 +72,7 @@ def pushed_axis(friction: float) -> Recording:
     return recording("axis", time[::10], axis_x=("displacement", measured), motor_fx=("force", force[::10] + noise))
 
 
-def shaken(cubic: float, acceleration: bool = False, until: float = 8.0, seed: int = 5) -> Recording:
+def shaken(cubic: float, acceleration: bool = False, until: float = 5.0, seed: int = 5) -> Recording:
     """At 500 Hz of an oscillator at 6 Hz, shaken from 2 to 12 Hz."""
     time = np.arange(0.0, until, 2e-3)
     rng = np.random.default_rng(seed)

@@ -62,9 +62,9 @@ def test_the_form_of_a_law_is_found_and_can_be_read_back(name, form, contacts, t
     assert all(element.acts_when_spent == contacts for element in target)
     again = diagnose(structure, case.recordings)
     assert again.verdict == "adequate" and "act on" not in again.text
-    for recording in case.recordings:  # and an estimator can follow it
-        estimator = make_estimator(structure, recording.test, "rls")
-        assert all(np.isfinite(estimate.parameters).all() for estimate in run(estimator, recording.samples()))
+    recording = case.recordings[0]  # and an estimator can follow it
+    estimator = make_estimator(structure, recording.test, "rls")
+    assert all(np.isfinite(estimate.parameters).all() for estimate in run(estimator, recording.samples()))
 
 
 def test_a_law_that_another_one_imitates_is_named_beside_it():

@@ -2,6 +2,7 @@
 
 import copy
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -35,6 +36,7 @@ class NeverPulls(Carrier):
         return max(super().__call__(crush, rate, peak), 0.0)
 
 
+@cache
 def case(law: type[Carrier], effects=(), seed: int = 60304):
     """Structure and recordings of a car on a barrier, between them a strong damper that the model knows."""
     drawn = draw_case("single", effects, seed)
@@ -50,10 +52,16 @@ def case(law: type[Carrier], effects=(), seed: int = 60304):
     return structure, [changed.record(speed, 0.5)[0] for speed in (0.75, 1.1)], drawn.hidden
 
 
+@cache
+def diagnosed(law: type[Carrier]):
+    """Of a model that lacks nothing."""
+    structure, recordings, _ = case(law)
+    return diagnose(structure, recordings)
+
+
 @pytest.mark.parametrize("law, said", [(Carrier, False), (NeverPulls, True)])
 def test_a_right_model_is_adequate_either_way(law, said):
-    structure, recordings, _ = case(law)
-    found = diagnose(structure, recordings)
+    found = diagnosed(law)
     assert found.verdict == "adequate" and ("never pull" in found.text) == said
 
 
@@ -79,7 +87,7 @@ def test_the_two_ways_differ_by_far_more_than_noise():
 def test_what_was_found_can_be_written_and_read_and_is_then_right_as_given(tmp_path):
     """`--apply` writes `damper_pulls: false`; with it the model is adequate as it stands, and says no more of it."""
     structure, recordings, _ = case(NeverPulls)
-    found = diagnose(structure, recordings)
+    found = diagnosed(NeverPulls)
     assert not found.structure.elements[0].damper_pulls
     drawn = draw_case("single", (), 60304)
     model, applied = tmp_path / "given.yaml", tmp_path / "applied.yaml"

@@ -1,4 +1,7 @@
-"""Constants of the messages are what the nodes say: words and numbers of each enumeration, no more and no fewer."""
+"""Constants of the messages are what the nodes say: words and numbers of each enumeration, no more and no fewer.
+
+What a diagnosis says of them is in test_diagnosis_node.py.
+"""
 
 import ast
 
@@ -15,8 +18,6 @@ from crash_msgs.msg import (
     ReplayState,
 )  # fmt: skip
 from crash_msgs.srv import AddEffect
-from helpers_diagnosis import Stage as DiagnosisStage
-from helpers_diagnosis import hidden_case
 from helpers_estimation import oscillator_recording
 from helpers_estimator_node import UNDAMPED
 from helpers_paths import ROOT
@@ -92,24 +93,3 @@ def test_an_estimator_says_them_and_who_comes_late_hears_them(stage, tmp_path):
     stage.node.create_subscription(Event, "one/events", late.append, EVENTS)
     stage.spin_until(lambda: len(late) == len(heard), "the late one has heard all")
     assert late == heard
-
-
-def test_a_diagnosis_says_them(tmp_path):
-    case, _, recording = hidden_case("side", "viscous_damping", 7204)
-    (tmp_path / "side.yaml").write_text(case.model_text)
-    stage = DiagnosisStage()
-    try:
-        stage.add_diagnosis(model=str(tmp_path / "side.yaml"))
-        stage.wait_for_listeners()
-        stage.send_test(recording)
-        stage.send(recording)
-        stage.wait_for_finals(1)
-        heard = stage.heard["diagnosis"]
-        assert {message.verdict for message in heard["ranking"]} <= set(constants(Ranking, str).values())
-        states = {window.state for message in heard["misfit"] for window in message.windows}
-        assert states and states <= set(constants(MisfitWindow, str).values())
-        model = stage.diagnoses[0].structure.name
-        assert {m.header.frame_id for m in (*heard["ranking"], *heard["misfit"])} == {model}
-        assert {m.header.frame_id for m in heard["revisions"]} == {m.model for m in heard["revisions"]}
-    finally:
-        stage.close()

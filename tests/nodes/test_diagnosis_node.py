@@ -7,10 +7,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from crash_msgs.msg import MisfitWindow, Ranking
 from crash_msgs.srv import AddEffect, GetSamples, RemoveEffect
 from helpers_diagnosis import Stage, hidden_case, joined
 from helpers_waiting import PATIENCE
 from numpy.testing import assert_allclose, assert_array_equal
+from test_constants import constants
 
 from crash_estimator.core.diagnosis.report.diagnosis import Diagnosis, diagnose
 from crash_estimator.core.effects.change import add_effect
@@ -22,9 +24,7 @@ from crash_replay.recording import Recording, Test
 from crash_replay.ros_messages import channel_to_msg, channel_type, samples_to_msg, stamp, stamp_ns
 
 SAME = 1e-9  # relative; the node's process multiplies small matrices in one thread, this one maybe in several
-
-PORTION = 100
-"""Samples after which a ranking is waited for."""
+PORTION = 100  # samples after which a ranking is waited for
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +113,16 @@ def test_after_the_last_sample_it_is_the_offline_answer(stage, case, offline):
     assert (final.number, final.revision, list(final.effects)) == (len(case[2]) - 1, 0, [])
     assert stamp_ns(final.header.stamp) == time_zero_ns(case[2]) + case[2].time_ns[-1]
     assert offline.verdict == "effect_missing" and not final.white_before and final.white_after
+
+
+def test_what_it_says_are_the_constants_of_its_messages(stage):
+    heard = stage.heard["diagnosis"]
+    assert {message.verdict for message in heard["ranking"]} <= set(constants(Ranking, str).values())
+    states = {window.state for message in heard["misfit"] for window in message.windows}
+    assert states and states <= set(constants(MisfitWindow, str).values())
+    frames = {m.header.frame_id for m in (*heard["ranking"], *heard["misfit"])}
+    assert frames == {stage.diagnoses[0].structure.name}
+    assert {m.header.frame_id for m in heard["revisions"]} == {m.model for m in heard["revisions"]}
 
 
 def test_other_recordings_are_used_with_the_replayed_one(stage, offline_on_both):

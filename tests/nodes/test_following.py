@@ -25,6 +25,7 @@ from crash_replay.recording import Recording
 
 DAMPED = {"damping": Coefficient(0.0, estimated=True, std=100.0)}
 METHODS_HERE = [name for name in METHODS if name != "effective_mass"]  # which needs a structure of its own
+BANK = {"gauss_newton_orders": {"largest": 1}}  # of four orders, which follow as nine do
 COMPILED = ("rls", "mrls", "kalman", "constrained_kalman")  # the others take a hundred times as long
 
 
@@ -46,7 +47,8 @@ def rows_of(recording: Recording, start: int, stop: int) -> Rows:
 
 
 def follower_of(recording: Recording, method: str = "mrls", **more) -> Follower:
-    estimator = make_estimator(oscillator(ESTIMATED, **DAMPED), recording.test, method, **more)
+    given = BANK.get(method, {}) | more
+    estimator = make_estimator(oscillator(ESTIMATED, **DAMPED), recording.test, method, **given)
     return Follower(estimator, Kept(recording.test))
 
 

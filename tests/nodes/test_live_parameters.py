@@ -26,13 +26,15 @@ def model(tmp_path) -> str:
     return str(tmp_path / "model.yaml")
 
 
-@pytest.fixture
-def diagnosed(tmp_path):
-    """A stage with the diagnosis of a case, which has said its final answer."""
+@pytest.fixture(scope="module")
+def diagnosed(tmp_path_factory):
+    """A stage with the diagnosis of a case, which has said its final answer; for the last tests of this file, as no
+    other stage can be in this process till it has closed."""
     case, structure, recording = hidden_case("side", "viscous_damping", 7204)
-    (tmp_path / "side.yaml").write_text(case.model_text)
+    model = tmp_path_factory.mktemp("model") / "side.yaml"
+    model.write_text(case.model_text)
     stage = DiagnosisStage()
-    stage.add_diagnosis(model=str(tmp_path / "side.yaml"))
+    stage.add_diagnosis(model=str(model))
     stage.wait_for_listeners()
     stage.send_test(recording)
     stage.send(recording)
@@ -115,13 +117,15 @@ def test_what_is_good_enough_is_judged_once_more(diagnosed):
 
 def test_a_time_limit_holds_for_the_next_final_answer(diagnosed):
     stage, *_ = diagnosed
-    assert "stopped after" not in stage.finals()[0].text
+    before = stage.finals()
+    assert not any("stopped after" in final.text for final in before)
     assert set_one(stage, "diagnosis", "time_limit", 0.001).successful
-    assert "stopped after 0.001 s" in stage.wait_for_finals(2).text
+    assert "stopped after 0.001 s" in stage.wait_for_finals(len(before) + 1).text
 
 
 def test_every_is_followed_and_asks_nothing_again(diagnosed):
     stage, *_ = diagnosed
+    before = len(stage.finals())
     assert set_one(stage, "diagnosis", "every", 0.01).successful
     stage.spin(1.0)
-    assert stage.diagnoses[0].wanted.every_ns == 10_000_000 and len(stage.finals()) == 1
+    assert stage.diagnoses[0].wanted.every_ns == 10_000_000 and len(stage.finals()) == before

@@ -48,7 +48,7 @@ class Sled(NamedTuple):
             self.estimator: {"model": self.model, "method": self.estimator},
             "record": {"to": folder / "said.mcap"},
             "viewer": {"rrd": folder / "shown.rrd", "port": 0, "open": False, "exit_when_finished": True},
-            "diagnosis": {"model": self.model, "time_limit": 20.0},  # that it answers counts here, not what
+            "diagnosis": {"model": self.model, "time_limit": 1.0},  # that it answers counts here, not what
         }  # fmt: skip
         folder.mkdir(parents=True)
         return {name: self._start(name, given[name], domain) for name in names}

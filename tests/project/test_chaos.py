@@ -2,8 +2,9 @@
 
 import pytest
 
+from crash_estimator.chaos import run as chaos_run
 from crash_estimator.chaos.case import case_of
-from crash_estimator.chaos.judge import COMPLETE, SAID
+from crash_estimator.chaos.judge import COMPLETE, SAID, judged
 from crash_estimator.chaos.results import references
 from crash_estimator.chaos.run import run_case
 
@@ -29,7 +30,6 @@ def reference(out):
 @pytest.mark.parametrize(
     "name, verdict, statuses",
     [
-        (STOPPED, COMPLETE, {"kalman": 0, "rls": 0, "record": 0, "replay": 0}),
         (KILLED, SAID, {"kalman": 0, "rls": -9, "record": 1, "replay": 1}),
         (HUNG_UP, SAID, {"kalman": 1, "rls": 0, "record": 1, "replay": 1}),
         (WITHOUT_REPLAY, SAID, {"kalman": 1, "rls": 1, "record": 1, "replay": -9}),
@@ -43,8 +43,13 @@ def test_run(name, verdict, statuses, out, reference):
     assert row["carried out"] and not row["not carried out"]
 
 
-def test_a_wrong_reference_is_noticed(out, reference):
+def test_who_was_stopped_is_complete_and_a_wrong_reference_is_noticed(out, reference, monkeypatch):
     """A run that is whole and says so fails where its numbers are not those of the reference."""
+    outcomes = []
+    monkeypatch.setattr(chaos_run, "judged", lambda outcome, by: outcomes.append(outcome) or judged(outcome, by))
     other = {name: content | {"5": "another"} for name, content in reference.items()}
-    row = run_case(case_of("estimators/frontal/undisturbed"), out, other)
+    row = run_case(case_of(STOPPED), out, other)
     assert row["verdict"] == "FAILED" and "1 of 341 other than undisturbed" in row["why"]
+    assert row["statuses"] == {"kalman": 0, "rls": 0, "record": 0, "replay": 0}, row
+    assert row["carried out"] and not row["not carried out"]
+    assert judged(outcomes[-1], reference).verdict == COMPLETE

@@ -5,14 +5,16 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
 
 from crash_msgs.msg import ParametersBlock
 from helpers_paths import ROOT
-from helpers_replay import environment
+from helpers_replay import Listener, environment, wait_until
 from mcap.writer import Writer
 from rclpy.serialization import serialize_message
+from std_srvs.srv import Trigger
 
 from crash_estimator.benchmarks.speed_lockstep import burning, said
 from crash_replay.lockstep import Answered, Lockstep
@@ -123,8 +125,7 @@ def test_runs_with_load_and_without_record_the_same_messages(tmp_path):
         file.parent.mkdir()
     runs = []
     for k, file in enumerate(files):
-        with burning() if k % 2 == 0 else nullcontext():
-            runs.append(run_recorded_to(file))
+        runs.append(run_recorded_to(file, burning if k % 2 == 0 else nullcontext))
     assert all("121 samples sent in 121 messages" in run for run in runs)
     first, *others = [messages_by_topic(file) for file in files]
     assert all(other == first for other in others)
@@ -160,8 +161,8 @@ def recording_of(file: Path, blocks: list[tuple[int, list[float]]]) -> Path:
     return file
 
 
-def run_recorded_to(file: Path) -> str:
-    """Replay in lock-step with two estimators -> what the replay says at the end."""
+def run_recorded_to(file: Path, load: Callable) -> str:
+    """Replay in lock-step with two estimators, under load from the first sample on -> what it says at the end."""
 
     def started(module: str, *arguments: str) -> subprocess.Popen:
         command = [sys.executable, "-m", module, "--ros-args", *arguments]
@@ -175,12 +176,16 @@ def run_recorded_to(file: Path) -> str:
     recorder = started("crash_replay.record_node", "-p", f"to:={file}", "-p", "wait_for:=2")
     replay = started(
         "crash_replay.replay_node", "-p", "bag:=bags/frontal_abrupt.mcap", "-p", "rate:=10.0", "-p", "block:=1",
-        "-p", "lockstep:=true", "-p", "wait_for:=3", "-p", "wait_timeout:=200.0",
+        "-p", "lockstep:=true", "-p", "wait_for:=4", "-p", "wait_timeout:=200.0", "-p", "start_paused:=true",
     )  # fmt: skip
     try:
-        told, _ = replay.communicate(timeout=240)
-        assert replay.returncode == 0
-        assert recorder.wait(timeout=60) == 0
+        with Listener() as listener:  # a fourth one
+            wait_until(lambda: listener.states and listener.states[-1].subscribers == 4)
+            with load():
+                assert listener.call(Trigger, "resume").success
+                told, _ = replay.communicate(timeout=240)
+                assert replay.returncode == 0
+                assert recorder.wait(timeout=60) == 0
         return told
     finally:
         for process in (*estimators, recorder, replay):

@@ -1,4 +1,7 @@
-"""What ports listen where: on the loopback interface only, however a node is started; elsewhere only if told to."""
+"""What ports listen where: on the loopback interface only, however a node is started; elsewhere only if told to.
+
+The nodes that wait here are looked at for what they take of the processor, too.
+"""
 
 import os
 import socket
@@ -6,13 +9,33 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
-from helpers_nodes import BAG, MODULES, end, environment, executable, node, parameters
+from helpers_nodes import BAG, MODULES, end, environment, executable, family, node, parameters
 from helpers_ports import bound, elsewhere
 from helpers_waiting import PATIENCE
 
 PORTS_OF_A_NODE = 4  # UDP: discovery, data, another one of Fast DDS, and the one that it sends from
+
+
+SHARE = 0.1
+"""Of a core; 0.03 at most where nothing else runs, and a replay that looked at every process all the time took 0.4."""
+SECONDS = 3.0
+"""Over which the share is taken."""
+TICK = 1.0 / os.sysconf("SC_CLK_TCK")
+
+
+def processor_time(process: int) -> float:
+    """s that a process and its children have had of any core."""
+    took = 0.0
+    for one in family(process):
+        try:
+            fields = Path(f"/proc/{one}/stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            continue  # it has ended
+        took += TICK * (int(fields[11]) + int(fields[12]))
+    return took
 
 
 def watched(command: list[str], given: dict[str, str], enough: Callable, seconds: float = 1.0) -> set:
@@ -40,10 +63,44 @@ def a_viewer(sockets: set) -> bool:
     return a_node(sockets) and any(protocol.startswith("tcp") for protocol, _, _ in sockets)
 
 
+@pytest.fixture(scope="module")
+def waiting(tmp_path_factory) -> dict[str, tuple[set, float]]:
+    """All nodes there are, waiting beside each other -> what each has bound and the least share of a core it took."""
+    given, folder = environment(), tmp_path_factory.mktemp("waiting")
+    nodes = {
+        name: subprocess.Popen(node(name, folder), env=given, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        for name in MODULES
+    }
+    seen, shares = {name: set() for name in nodes}, dict.fromkeys(nodes, 1.0)
+    limit = time.monotonic() + 2 * PATIENCE  # what is not compiled yet is so at the start, on a busy machine
+    started = lambda: all(map(a_node, seen.values())) and a_viewer(seen["viewer"])  # noqa: E731
+    try:
+        while time.monotonic() < limit and not (started() and max(shares.values()) <= SHARE):
+            before, began = {name: processor_time(process.pid) for name, process in nodes.items()}, time.monotonic()
+            while time.monotonic() < began + SECONDS:
+                for name, process in nodes.items():
+                    assert process.poll() is None, f"{name} has ended"
+                    seen[name] |= bound(process.pid)
+                time.sleep(0.2)
+            for name, process in nodes.items():
+                took = processor_time(process.pid) - before[name]
+                shares[name] = min(shares[name], took / (time.monotonic() - began))
+    finally:
+        end(list(nodes.values()))
+    return {name: (seen[name], shares[name]) for name in nodes}
+
+
 @pytest.mark.parametrize("name", MODULES)
-def test_a_node_listens_on_this_machine_only(name, tmp_path):
-    seen = watched(node(name, tmp_path), environment(), a_viewer if name == "viewer" else a_node)
+def test_a_node_listens_on_this_machine_only(name, waiting):
+    seen, _ = waiting[name]
+    assert a_viewer(seen) if name == "viewer" else a_node(seen)
     assert not elsewhere(seen), seen
+
+
+def test_nodes_that_wait_take_next_to_nothing(waiting):
+    """Who waits leaves the processor to those who work: above all the replay beside a compilation it waits for."""
+    least = {name: share for name, (_, share) in waiting.items()}
+    assert least == pytest.approx(dict.fromkeys(waiting, 0.0), abs=SHARE)
 
 
 def test_so_it_does_as_a_module_and_where_ros_alone_is_told_to_stay_on_this_machine(tmp_path):

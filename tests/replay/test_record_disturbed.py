@@ -56,13 +56,13 @@ def test_stopped_for_longer_than_the_middleware_waits_it_asks_for_what_it_missed
 
 
 def test_killed_at_any_moment_its_file_can_be_read_and_lacks_next_to_nothing(monkeypatch):
-    """Five moments; fifty: `python -m crash_replay.record_killed`, which asks for half a second.
+    """Three moments; fifty: `python -m crash_replay.record_killed`, which asks for half a second.
 
     Here it is 5 s: beside other tests `record` may get no processor for longer than half a second (3 of 50 did not at a
     load of 20), and no test fails by the clock; what it holds back longer than that it would hold back for ever.
     """
     for name, value in {**environment(), "ROS_DOMAIN_ID": str(DOMAIN)}.items():
         monkeypatch.setenv(name, value)
-    found = list(record_killed.kills(5, seed=3))
+    found = list(record_killed.kills(3, seed=3))
     assert all(not killed.fault and killed.oldest_missing < 5.0 for killed in found), found
-    assert sum(killed.messages for killed in found) > 1000
+    assert sum(killed.messages for killed in found) > 600

@@ -7,6 +7,7 @@ import subprocess
 import numpy as np
 import pytest
 from crash_msgs.msg import Ranking
+from helpers_diagnosis import hidden_case
 from helpers_estimator_node import joined
 from helpers_paths import BAGS
 from helpers_waiting import PATIENCE
@@ -15,7 +16,7 @@ from numpy.testing import assert_array_equal
 from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.model_file import load_model
-from crash_replay.bag import read_bag
+from crash_replay.bag import read_bag, write_bag
 from crash_replay.qos import SAID
 
 BAG = BAGS / "frontal_engine_cab.mcap"
@@ -117,17 +118,18 @@ def test_a_replay_that_was_stopped_goes_on_and_nothing_is_missing(stage, whole):
     assert_whole(stage, victim, whole)
 
 
-def test_a_diagnosis_that_was_stopped_gives_the_same_answer(stage):
+def test_a_diagnosis_that_was_stopped_gives_the_same_answer(stage, tmp_path):
+    case, _, recording = hidden_case("single", "viscous_damping", 8101)
+    bag, model = write_bag(recording, tmp_path / "damped.mcap"), tmp_path / "damped.yaml"
+    model.write_text(case.model_text)
     answers: list[Ranking] = []
     stage.node.create_subscription(Ranking, "diagnosis/ranking", answers.append, SAID)
     final = lambda: [answer for answer in answers if answer.final]  # noqa: E731
     undisturbed = None
     for stop in (False, True):
         answers.clear()
-        diagnosis = stage.start("crash_estimator.nodes.diagnosis_node", model=BAGS / "hidden_effect.model.yaml")
-        replay = stage.replay(
-            BAGS / "hidden_effect.mcap", rate=0.1, stderr=subprocess.PIPE, listeners="[diagnosis]", wait_timeout=200.0
-        )
+        diagnosis = stage.start("crash_estimator.nodes.diagnosis_node", model=model)
+        replay = stage.replay(bag, rate=0.1, stderr=subprocess.PIPE, listeners="[diagnosis]", wait_timeout=200.0)
         stage.spin_until(lambda: answers, "the diagnosis has begun", 4 * PATIENCE)
         if stop:
             diagnosis.send_signal(signal.SIGSTOP)

@@ -20,7 +20,7 @@ from crash_replay.starting import ENDING, held
 
 BAG = str(ROOT / "bags/impactor_single.mcap")
 OF_A_BAG = [BAG, "--model", "impactor_single"]
-FULL, FEW = 20, 4
+FULL, FEW = 10, 2
 """Moments: of those that take longest to start, and of others that start in the same way."""
 STARTED = 2.5
 """s, on an idle machine, in which all of them have been started."""

@@ -63,7 +63,7 @@ def test_the_plan_asks_for_every_form_in_300_cases_with_a_seed_each():
 
 @pytest.mark.parametrize("name", [
     "side/friction.stick/1g/clean", "wall/gap.one/0.5g/ringing", "sled/nothing/2g/coloured", "wall/nothing/1g/shifted",
-    "side/channel.delay/1g/clipped", "wall/nothing/1g/1khz",
+    "sled/channel.delay/1g/clipped", "wall/nothing/1g/1khz",
 ])  # fmt: skip
 def test_a_case_is_the_same_again_by_its_name(name):
     one, again = (drawn(case_of(f"{name}/{SEED}")) for _ in range(2))
@@ -71,7 +71,10 @@ def test_a_case_is_the_same_again_by_its_name(name):
     for a, b in zip(one.recordings, again.recordings):
         assert_array_equal(a.values, b.values)
         assert_array_equal(a.time_ns, b.time_ns)
-    other = drawn(case_of(f"{name}/{SEED + 1}"))
+
+
+def test_another_seed_is_another_case():
+    one, other = (drawn(case_of(f"wall/gap.one/1g/clean/{SEED + n}")) for n in (0, 1))
     assert other.model_text != one.model_text
 
 
@@ -79,7 +82,8 @@ def test_what_is_hidden_changes_the_recording_by_more_than_the_noise():
     for n, (name, form) in enumerate(FORMS.items()):
         if form.effect == "unmodelled_body":  # it changes the model, not the recording
             continue
-        case = Case(list(form.targets)[0], name, 1.0, "clean", SEED + 100 + n)
+        quickest = next(one for one in ("wall", "sled", "side", "cab") if one in form.targets)
+        case = Case(quickest, name, 1.0, "clean", SEED + 100 + n)
         assert drawn(case).seen > SEEN, case.name
 
 

@@ -28,6 +28,8 @@ pytestmark = pytest.mark.usefixtures("strict")
 
 NAME, REVISED = "ckf", speaker("ckf", 1)
 NEWEST, OLD = ESTIMATOR_COLORS[0], faded(ESTIMATOR_COLORS[0])
+SIZE = (1200, 675)
+"""Pixels: large enough for every view, and drawn in less time than what a screen has."""
 COMPARED = {
     "Overview", "Measured and model", "Residuals", "Parameters", "Force over crush", "Motion and states", "Events",
     "Validation", "Missing effect",
@@ -70,7 +72,7 @@ def recorded(path: Path, crash: crash_data.Crash, structure: Structure, *spoken:
 
 def pictures(rrd: Path, folder: Path) -> dict[str, np.ndarray]:
     try:
-        written = screenshots(rrd, folder)
+        written = screenshots(rrd, folder, size=SIZE)
     except ScreenshotError as error:
         pytest.skip(f"no picture without a screen on this machine: {error}")
     return {tab: np.asarray(Image.open(png).convert("RGB")).astype(int) for tab, png in written.items()}
