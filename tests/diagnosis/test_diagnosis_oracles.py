@@ -228,8 +228,8 @@ PULLS_OR_NOT = [(e, pulls) for pulls in (True, False) for e in IN_BOTH if pulls 
 def test_the_two_free_runs_agree(effect, pulls, recording):
     """The diagnosis's simulation and the estimators' free run, of one model with the same constants."""
     model = structure(*([effect] if effect else []))
-    foam = replace(model.elements[0], damper_pulls=pulls)
-    assert_free_runs_agree(replace(model, elements=(foam, model.elements[1])), recording)
+    foam, mount = model.elements
+    assert_free_runs_agree(replace(model, elements=(replace(foam, damper_pulls=pulls), mount)), recording)
 
 
 @pytest.mark.parametrize("effect, what", ON_A_LINE, ids=shown)
@@ -248,12 +248,11 @@ def assert_free_runs_agree(model: Structure, recording: Recording) -> None:
     """At every other sample, of each of which the free run makes one step; what plays between two stops takes all."""
     every = 1 if any(effect.variant == "play" for effect in model.effects) else 2
     recording = replace(recording, time_ns=recording.time_ns[::every], values=recording.values[::every])
-    one = outputs(*problem_of(model, recording))
-    estimator = make_estimator(model, recording.test, "rls")
+    one, estimator = outputs(*problem_of(model, recording)), make_estimator(model, recording.test, "rls")
     other = free_run(applied(model, recording.test), estimator.description, run(estimator, recording.samples()))
     # at the impact itself, where forces jump, one is on this side of it and the other on that
-    error = (one - other.predicted)[2:]
-    assert np.all(np.sqrt(np.mean(error**2, axis=0)) < 0.002 * np.abs(one).max(axis=0))
+    error = np.sqrt(np.mean((one - other.predicted)[2:] ** 2, axis=0))
+    assert np.all(error < 0.002 * np.abs(one).max(axis=0))
 
 
 def test_a_step_is_the_bounded_least_squares_solution(recording):
