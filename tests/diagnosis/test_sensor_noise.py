@@ -16,6 +16,7 @@ from crash_estimator.core.diagnosis.observation.whitening import filtered, weigh
 from crash_estimator.core.noise_spectrum import NoiseSpectrum
 from crash_estimator.core.sensor_noise import sensor_noise
 from crash_estimator.model_file import ModelFile
+from crash_replay.conditioning import cfc_filter
 from crash_replay.recording import Channel, Recording, Test
 from crash_replay.second_generator.cases import case_of, drawn
 from crash_replay.second_generator.sensors import RATE, Sensors
@@ -126,3 +127,35 @@ def test_without_a_rest_the_noise_is_that_beside_the_motion_of_the_crash(rate):
         for k in range(20)
     ]
     assert np.median(found) == pytest.approx(2.0, rel=0.15)
+
+
+@pytest.mark.parametrize(("kept", "assumed"), [(20, True), (400, False)])
+def test_behind_a_filter_that_a_rest_is_too_short_for_the_noise_is_taken_for_a_share_of_the_peak(kept, assumed):
+    """Taken for its fast part, as it was, the floor was a ten-millionth of the noise.
+
+    White noise of 2 m/s^2 at 10 kHz, behind CFC 60; so many samples of rest.
+    """
+    time_ns = np.arange(-400, 1000) * 100_000
+    pulse = 300.0 * np.sin(np.pi * np.clip(time_ns * 1e-9 / 0.06, 0.0, 1.0)) ** 2
+    values = cfc_filter(pulse + np.random.default_rng(5).normal(0.0, 2.0, len(time_ns)), 1e-4, 60)[400 - kept :]
+    found = sensor_noise(values, time_ns[400 - kept :], rests=True)
+    assert found.assumed == assumed and found.corner == pytest.approx(2.0775 * 60)
+    assert found.std == pytest.approx(3.0 if assumed else 2.0, rel=0.3)
+
+
+def test_a_channel_that_no_filter_has_passed_is_as_loud_as_its_fast_part():
+    values = np.random.default_rng(5).normal(0.0, 2.0, 1000) + 300.0 * np.sin(np.arange(1000) / 300.0)
+    found = sensor_noise(values, np.arange(-10, 990) * 100_000, rests=True)
+    assert not found.assumed and found.white and found.std == pytest.approx(2.0, rel=0.1)
+
+
+@pytest.mark.parametrize(("kept", "said"), [(20, True), (400, False)])
+def test_that_it_is_assumed_is_said(kept, said):
+    case = drawn(case_of("side/path.linear/2g/cfc180/71100095"))
+    structure = ModelFile.model_validate(yaml.safe_load(case.model_text)).structure()
+    cut = [
+        Recording(r.test, r.time_ns[r.time_ns > -kept * 1e5], r.values[r.time_ns > -kept * 1e5])
+        for r in case.recordings
+    ]
+    found = diagnose(structure, cut)
+    assert ("too little is recorded at rest to tell the noise behind a filter" in found.text) == said, found.text

@@ -55,6 +55,9 @@ J211's, 1.82 of two poles passed once, 3.3 of one."""
 CORNER = 2.0775
 """Hz, f0 for each of a channel frequency class (SAE J211-1, appendix C)."""
 
+SLOWEST_FILTER = CORNER * min(CFC_CLASSES)
+"""Hz, f0 of CFC 60."""
+
 TEN_DOWN = 1.21
 """Times f0: where G^2 is 10 dB down."""
 
@@ -75,6 +78,7 @@ class NoiseSpectrum(NamedTuple):
     coefficients: tuple[float, ...] = ()  # a_k of coloured noise; none: white
     corner: float = np.inf  # f0, Hz, of the filter that has cut it off; inf: none has
     period: float = 1.0  # s
+    assumed: bool = False  # too little is recorded at rest to tell it
 
     @property
     def white(self) -> bool:

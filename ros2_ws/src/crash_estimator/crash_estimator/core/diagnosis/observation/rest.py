@@ -11,14 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crash_replay.conditioning import CFC_CLASSES, RESTS_AT_ZERO
+from crash_replay.conditioning import RESTS_AT_ZERO
 from crash_replay.onset import find_onset
 from crash_replay.recording import Recording
 
-from ...noise_spectrum import CORNER, Colour, NoiseSpectrum, colour_of, seen_early
+from ...noise_spectrum import SLOWEST_FILTER, Colour, NoiseSpectrum, colour_of, seen_early
 from ...sensor_noise import ENOUGH
 
-EARLIEST = seen_early(CORNER * min(CFC_CLASSES))
+EARLIEST = seen_early(SLOWEST_FILTER)
 """s before the impact in which any filter of SAE J211-1 may show what moves: they do not tell the noise's colour."""
 
 

@@ -9,6 +9,7 @@ from ...derived_motion import with_accelerations
 from ...effects import EFFECTS
 from ...effects.effect import Addition, Effect
 from ...sensor_faults import without_faults
+from ...sensor_noise import ASSUMED
 from ...structure import ModelError, Structure
 from ..observation.record import refuse_dead_channels
 from ..residuals.in_band import in_band
@@ -113,6 +114,12 @@ def diagnose(
         stopped = search_is_over()
     found = _answer(structure, begun.path, tolerance, begun.zero)
     remarks = [faults] if faults else []
+    assumed = [one.test.id for one in begun.path.records if any(spectrum.assumed for spectrum in one.spectra)]
+    if assumed:
+        remarks.append(
+            f"of {', '.join(assumed)} too little is recorded at rest to tell the noise behind a filter: it is taken "
+            f"for {100.0 * ASSUMED:g} % of the peak; record 20 ms before time zero, or state it (`noise` of a body)"
+        )
     elsewhere = {shift.test: shift.seconds for shift in begun.unused if shift.off(0.0)}  # whatever a filter shows early
     if elsewhere:
         remarks.append(signals_begin(elsewhere))

@@ -101,9 +101,8 @@ class _Search:
             if not there or not self._rest_until(there):
                 continue
             begun = self._begun(there, as_stated)
-            alone = begun.zero if begun.path.noise and not begun.path.added else None
-            if alone and alone.gain(begun.path.final) < THRESHOLDS.gain:
-                return None  # noise is left, but no less than from the stated time zero on
+            if begun.zero and begun.zero.gain(begun.path.final) < THRESHOLDS.gain:
+                continue  # no less than the model as given leaves from the stated time zero on
             tried.append(begun)
             if tried[-1].path.noise:
                 return (self._alone(tried[-1]) or tried[-1]) if len(tried[-1].path.added) <= most else None
