@@ -194,7 +194,8 @@ def observe(structure: Structure, recording: Recording, rest: Rest | None = None
     names = [name for _, name, _ in structure.channels()]
     names += [c.name for c in recording.test.channels if c.quantity == "acceleration"]
     rest = rest or rests_of([recording])[0]
-    signals = {name: _signal(recording, name, time, rest) for name in dict.fromkeys(names)}
+    derived = {name for body in structure.bodies if body.derived for name in body.acceleration}
+    signals = {name: _signal(recording, name, time, rest, name in derived) for name in dict.fromkeys(names)}
     for element in structure.elements:
         if element.displacement:
             signals[element.displacement] = _from_rest(signals[element.displacement], element.tension, rest.ends)
@@ -250,7 +251,7 @@ def refuse_dead_channels(structure: Structure, recording: Recording) -> None:
             )
 
 
-def _signal(recording: Recording, name: str, grid: np.ndarray, rest: Rest) -> Signal:
+def _signal(recording: Recording, name: str, grid: np.ndarray, rest: Rest, derived: bool) -> Signal:
     valid = np.isfinite(recording.column(name))
     if not valid.any():
         raise ModelError(f"test {recording.test.id}: channel {name} has no valid sample")
@@ -260,7 +261,7 @@ def _signal(recording: Recording, name: str, grid: np.ndarray, rest: Rest) -> Si
     rests = channel.quantity in RESTS_AT_ZERO
     offset = float(recording.column(name)[before].mean()) if rests and count else 0.0
     values = bridged(recording, name) - offset
-    noise = sensor_noise(values, recording.time_ns - rest.ends, rests, rest.colours.get(name, ()))
+    noise = sensor_noise(values, recording.time_ns - rest.ends, rests, rest.colours.get(name, ()), derived)
     values = noise.unfiltered(values)
     on_grid = np.interp(grid, recording.time, values)
     return Signal(recording.time, values, on_grid, noise, noise.std / np.sqrt(count) if count else 0.0)
