@@ -3,6 +3,7 @@
 The cases are the second generator's, of its development seeds."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from crash_estimator.benchmarks.second_judge import judge, right
 from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.core.diagnosis.observation.rest import rests_of
 from crash_estimator.core.diagnosis.observation.whitening import filtered, weights
+from crash_estimator.core.diagnosis.report.tolerance import DEFAULT
+from crash_estimator.core.diagnosis.report.verdict import Evidence, verdict_on
 from crash_estimator.core.noise_spectrum import NoiseSpectrum
 from crash_estimator.core.sensor_noise import sensor_noise
 from crash_estimator.model_file import ModelFile
@@ -151,11 +154,23 @@ def test_a_channel_that_no_filter_has_passed_is_as_loud_as_its_fast_part():
 
 @pytest.mark.parametrize(("kept", "said"), [(20, True), (400, False)])
 def test_that_it_is_assumed_is_said(kept, said):
-    case = drawn(case_of("side/path.linear/2g/cfc180/71100095"))
+    case = drawn(case_of("side/path.linear/1g/clean/71100095"))
     structure = ModelFile.model_validate(yaml.safe_load(case.model_text)).structure()
-    cut = [
-        Recording(r.test, r.time_ns[r.time_ns > -kept * 1e5], r.values[r.time_ns > -kept * 1e5])
-        for r in case.recordings
-    ]
-    found = diagnose(structure, cut)
+
+    def behind_a_filter(recording: Recording) -> Recording:
+        values = np.apply_along_axis(cfc_filter, 0, recording.values, recording.sample_period, 180)
+        late = recording.time_ns > -kept * recording.sample_period * 1e9
+        return Recording(recording.test, recording.time_ns[late], values[late])
+
+    found = diagnose(structure, list(map(behind_a_filter, case.recordings)))
     assert ("too little is recorded at rest to tell the noise behind a filter" in found.text) == said, found.text
+
+
+@pytest.mark.parametrize(("assumed", "of_peak", "word"), [
+    (False, 0.02, "adequate"), (True, 0.005, "adequate"), (True, 0.02, "unexplained"),
+])  # fmt: skip
+def test_a_model_is_not_adequate_for_leaving_less_than_a_noise_that_is_assumed(assumed, of_peak, word):
+    left = SimpleNamespace(of_peak=of_peak, is_less_than_noise=True)
+    constant = SimpleNamespace(constant=True, share=0.0)
+    evidence = Evidence(0, True, constant, left, left, (), False, True, assumed=assumed)
+    assert verdict_on(evidence, DEFAULT).word == word

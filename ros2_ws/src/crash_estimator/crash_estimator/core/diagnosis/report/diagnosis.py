@@ -114,8 +114,7 @@ def diagnose(
         stopped = search_is_over()
     found = _answer(structure, begun.path, tolerance, begun.zero)
     remarks = [faults] if faults else []
-    assumed = [one.test.id for one in begun.path.records if any(spectrum.assumed for spectrum in one.spectra)]
-    if assumed:
+    if assumed := _with_assumed_noise(begun.path):
         remarks.append(
             f"of {', '.join(assumed)} too little is recorded at rest to tell the noise behind a filter: it is taken "
             f"for {100.0 * ASSUMED:g} % of the peak; record 20 ms before time zero, or state it (`noise` of a body)"
@@ -126,6 +125,11 @@ def diagnose(
     if stopped:
         remarks.append(f"stopped after {limit_text(seconds)}: not everything was tried")
     return replace(found, stopped=stopped, text="; ".join([found.text, *remarks]))
+
+
+def _with_assumed_noise(path: SelectionPath) -> list[str]:
+    """Tests."""
+    return [one.test.id for one in path.records if any(spectrum.assumed for spectrum in one.spectra)]
 
 
 def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zero: TimeZero | None) -> Diagnosis:
@@ -157,7 +161,18 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
     many = len(added) or len(reports)  # a time zero is none of the effects that may be too many
     needed = needed_share(added)
     evidence = Evidence(
-        many, final.white, drift, before, after, ranking, weighed, certain, by_first, needed, structure.place_of
+        many,
+        final.white,
+        drift,
+        before,
+        after,
+        ranking,
+        weighed,
+        certain,
+        by_first,
+        needed,
+        structure.place_of,
+        bool(_with_assumed_noise(path)),
     )
     verdict = verdict_on(evidence, tolerance)
     if added and verdict.word == ADEQUATE:

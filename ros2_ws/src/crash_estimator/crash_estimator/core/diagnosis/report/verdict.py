@@ -26,6 +26,7 @@ class Evidence(NamedTuple):
     by_first: float = 0.0  # share of the misfit in the band that the first effect explains, wherever it is missing
     needed: float = THRESHOLDS.named_share  # share that all of them must explain
     place_of: Callable[[str], Hashable] = str  # what two targets have in common that are the same place
+    assumed: bool = False  # the noise is, of some channel: to be less than it says little
 
     @property
     def noise(self) -> bool:
@@ -40,12 +41,12 @@ class Verdict(NamedTuple):
 
 def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
     """`adequate`: nothing significant is missing, or nothing is named and what is left of the model as given is within
-    the tolerance, and no candidate explains any of it or it is less than the noise; `effect_missing`: what is named
-    beats its rivals and takes a large share of the misfit away; else `unexplained`."""
-    if tolerance.stated and tolerance.admits(evidence.before):
+    the tolerance, and no candidate explains any of it or it is less than the noise, or the noise is assumed;
+    `effect_missing`: what is named beats its rivals and takes a large share of the misfit away; else `unexplained`."""
+    if (tolerance.stated or evidence.assumed) and tolerance.admits(evidence.before):
         return Verdict(ADEQUATE, True)
     if evidence.noise:
-        word = EFFECT_MISSING if evidence.added else ADEQUATE
+        word = EFFECT_MISSING if evidence.added else UNEXPLAINED if evidence.assumed else ADEQUATE
         return Verdict(word if evidence.added <= THRESHOLDS.most_at_once else UNEXPLAINED, True)
     within = tolerance.admits(evidence.after)
     if _explains(evidence) and _stands_still(evidence) and (within or _beats_its_rivals(evidence)):
