@@ -7,7 +7,7 @@ WIDEST = 2
 SHORTEST = 2.5e-4
 """s: what lasts as long may be the truth; a filter of CFC 1000, as recorders have, passes nothing shorter."""
 FARTHER = 10.0
-"""Times as far out as everything else that is: of some 700 looked-at channels, real and simulated, what is farthest
+"""Times as far out as everything else that is: of 539 looked-at channels, most of them simulated, what is farthest
 out is so by 3.4 times at most, two spikes that were put into them by 32 and 38."""
 MOST = 10
 """Spikes of a channel that are looked for; one that has more is no sensor's that has been looked at."""

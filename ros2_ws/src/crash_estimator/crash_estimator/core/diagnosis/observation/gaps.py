@@ -4,6 +4,7 @@ import numpy as np
 
 from crash_replay.recording import Recording
 
+from ...clipping import runs_of
 from ...momentum import acceleration_by_momentum, lacking_for_momentum
 from ...structure import Structure
 
@@ -25,7 +26,7 @@ def through_gaps(structure: Structure, body: str, recording: Recording, name: st
         found = acceleration_by_momentum(structure, body, recording)
         return np.where(lost & np.isfinite(found), found, bridged)
     values = bridged.copy()
-    for start, stop in np.flatnonzero(np.diff(np.concatenate([[0], lost.view(np.int8), [0]]))).reshape(-1, 2):
+    for start, stop in runs_of(lost):
         beside = max(round(BESIDE * (stop - start)), FEWEST)
         near = np.arange(max(start - beside, 0), min(stop + beside, len(lost)))
         known = near[~lost[near]]

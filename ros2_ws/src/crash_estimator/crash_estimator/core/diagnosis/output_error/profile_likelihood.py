@@ -65,7 +65,7 @@ def closer(look: Profile) -> Fit:
         start[look.coefficient] = np.exp(logarithm)
         found = fit(look.problem, Point(start, best.trajectories), SLOW_CONTACT, held=(look.coefficient,))
         best = min(best, found, key=lambda one: one.cost)
-        return min(found.cost, 10.0 * look.fit.cost)  # finite
+        return min(found.cost, 10.0 * look.fit.cost)  # finite; any factor above 1 does
 
     bounds = max(look.at - STEP, look.lowest), look.at + STEP
     minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": PRECISION})
