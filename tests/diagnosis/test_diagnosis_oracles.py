@@ -19,6 +19,7 @@ from crash_estimator.core.diagnosis.output_error.problem import OutputErrorProbl
 from crash_estimator.core.diagnosis.output_error.simulation import simulate
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 from crash_estimator.core.diagnosis.parameterization.model_terms import additions_of
+from crash_estimator.core.diagnosis.selection.time_zero import Shift, coasting
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.effects.applied import applied
 from crash_estimator.core.fold import run
@@ -132,9 +133,9 @@ def test_every_effect_of_the_vocabulary_is_looked_at():
     assert {effect.type for effect in EVERY_EFFECT} == set(EFFECTS)
 
 
-def problem_of(model: Structure, recording: Recording) -> tuple[OutputErrorProblem, Point]:
+def problem_of(model: Structure, recording: Recording, impact_std: float = 0.0) -> tuple[OutputErrorProblem, Point]:
     """The problem of a model, and its simulation with the coefficients that it states."""
-    records = [observe(model, recording)]
+    records = [observe(model, recording)._replace(impact_std=impact_std)]
     magnitudes = measure_magnitudes(model, records, 12)
     problem = make_problem(magnitudes, records, additions_of(magnitudes, EFFECTS))
     start = problem.layout.start
@@ -197,26 +198,40 @@ def test_so_they_are_by_a_stiffness_that_is_also_a_line_s_slope(recording):
     assert_derivatives_agree(structure(bent, stiffness=open_), recording, NEAR["yielding"])
 
 
+def test_so_they_are_by_when_bodies_touch_that_coast_until_then(recording):
+    """Without a damper: a force that jumps would do so at another sample."""
+    foam, mount = structure().elements
+    model = replace(structure(), elements=(replace(foam, damping=Coefficient(0.0)), mount))
+    coasts = coasting(recording, Shift(0, "striker", 0.0, 5e-4, 1e-4))
+    problem, point = problem_of(model, coasts, impact_std=5e-4)
+    (late,) = problem.layout.late
+    assert_derivative_agrees(problem, point, late, 1e-5, 0.03)
+
+
 def assert_derivatives_agree(model: Structure, recording: Recording, near: float) -> None:
     problem, point = problem_of(model, recording)
-    (experiment,) = problem.experiments
-    equations = linearise(experiment, point.theta, point.trajectories[0])
-    by_equations = whitened(experiment, point.theta, point.trajectories[0], equations)[:, :, 1:]
-    record, (term,) = experiment.record, problem.layout.terms
+    (term,) = problem.layout.terms
     constants = [link.constant for link in problem.layout.links if link.constant is not None]
     for parameter in (term.coefficient, *term.shapes.values(), *constants):
         step = 1e-4 * max(abs(point.theta[parameter]), 1e-6)
-        moved = []
-        for sign in (1.0, -1.0):
-            theta = point.theta.copy()
-            theta[parameter] += sign * step
-            moved.append(outputs(problem, simulate(problem, theta, point.trajectories)))
-        slope = np.zeros((len(record.time), moved[0].shape[1]))
-        slope[record.at] = (moved[0] - moved[1]) / (2.0 * step)
-        expected = binned(record.bin, equations.sampling.weight * slope, record.bins)
-        found = by_equations[:, :, list(equations.columns).index(parameter)]
-        assert np.linalg.norm(expected) > 0.0
-        assert np.linalg.norm(found - expected) < near * np.linalg.norm(expected), problem.layout.names[parameter]
+        assert_derivative_agrees(problem, point, parameter, step, near)
+
+
+def assert_derivative_agrees(problem: OutputErrorProblem, point: Point, parameter: int, step: float, near: float):
+    (experiment,) = problem.experiments
+    equations = linearise(experiment, point.theta, point.trajectories[0])
+    by_equations = whitened(experiment, point.theta, point.trajectories[0], equations)[:, :, 1:]
+    record, moved = experiment.record, []
+    for sign in (1.0, -1.0):
+        theta = point.theta.copy()
+        theta[parameter] += sign * step
+        moved.append(outputs(problem, simulate(problem, theta, point.trajectories)))
+    slope = np.zeros((len(record.time), moved[0].shape[1]))
+    slope[record.at] = (moved[0] - moved[1]) / (2.0 * step)
+    expected = binned(record.bin, equations.sampling.weight * slope, record.bins)
+    found = by_equations[:, :, list(equations.columns).index(parameter)]
+    assert np.linalg.norm(expected) > 0.0
+    assert np.linalg.norm(found - expected) < near * np.linalg.norm(expected), parameter
 
 
 IN_BOTH = [None, *(effect for effect in EVERY_EFFECT if not EFFECTS[effect.type].distorts)]

@@ -80,10 +80,13 @@ def test_an_early_onset_is_not_taken_where_only_what_is_found_without_it_leaves_
     early = Shift(0, "test", -9e-3, 1e-4, 1e-4, early=8e-3)
     stated, moved = [SimpleNamespace(seen_early=8e-3)], [SimpleNamespace(seen_early=8e-3)]
     paths = {id(moved): SimpleNamespace(noise=from_onset), id(stated): SimpleNamespace(noise=as_stated)}
+    search = onset_search._Search
     monkeypatch.setattr(onset_search, "onsets", lambda recordings: (early,))
-    monkeypatch.setattr(onset_search, "common_effects", lambda structure, effects: effects)
-    monkeypatch.setattr(onset_search, "time_zero_wrong", lambda *given: "moved")
-    monkeypatch.setattr(onset_search._Search, "_observed", lambda self, shifts=(): moved if shifts else stated)
-    monkeypatch.setattr(onset_search._Search, "_selected", lambda self, records: paths[id(records)])
-    found = onset_search._Search(None, (), {}).from_early_onsets()
+    monkeypatch.setattr(onset_search, "as_given", lambda *given: (None, SimpleNamespace(white=False)))
+    monkeypatch.setattr(search, "in_doubt", SimpleNamespace(noise=False))
+    monkeypatch.setattr(search, "_begins_early", lambda self, given, early: "moved")
+    monkeypatch.setattr(search, "_may_begin_elsewhere", lambda self, path, elsewhere: False)
+    monkeypatch.setattr(search, "_observed", lambda self, shifts=(): moved if shifts else stated)
+    monkeypatch.setattr(search, "_selected", lambda self, records: paths[id(records)])
+    found = search(None, (), {}).begun()
     assert found == (Begun(paths[id(moved)], "moved", ()) if taken else Begun(paths[id(stated)], None, (early,)))

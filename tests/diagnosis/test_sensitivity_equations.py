@@ -36,7 +36,7 @@ def system(observer: float) -> Linear:
         kp=np.where(loading, 0.0, rng.uniform(-900.0, 900.0, shape)),
         loading=loading, knot=knot, weight=rng.normal(size=(*shape, 2)),
         changed=np.ones(INSTANTS, dtype=bool), observer=observer, others=OTHERS,
-        start=np.where(KIND[:, None] == FIXED, 0.0, rng.normal(size=(len(KIND), OTHERS))),
+        start=np.where(KIND[:, None] == FIXED, 0.0, rng.normal(size=(2, len(KIND), OTHERS))),
         column=np.array([0, 1, 2, 4]), body=np.array([0, 1, 2, 3]), acts=acts,
         remembers=remembers, kept=rng.uniform(0.5, 0.9, memory), by_crush=rng.normal(size=memory),
         by_before=rng.normal(size=memory), recalled=rng.normal(0.0, 50.0, memory),
@@ -57,7 +57,7 @@ def stepped(s: Linear) -> Motion:
     """The acceleration is a straight line within a step, at whose end it obeys the equations: one linear solve."""
     b, n = len(s.kind), s.others + KNOTS
     x, v, a, peak = np.zeros((b, n)), np.zeros((b, n)), np.zeros((b, n)), np.zeros((len(s.ends), n))
-    v[:, : s.others] = s.start
+    v[:, : s.others], x[:, : s.others] = s.start
     memory, found = np.zeros((len(s.remembers), n)), []
     free, driven, fixed = s.kind == FREE, s.kind == DRIVEN, s.kind == FIXED
     push = np.zeros((b, len(s.ends)))  # acceleration of each body (or force on a fixed one) by each link's force

@@ -11,7 +11,9 @@ from numpy.testing import assert_allclose
 
 from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.core.diagnosis.observation.record import observe
-from crash_estimator.core.diagnosis.selection.time_zero import Shift, TimeZero, moved_by, time_zero_wrong
+from crash_estimator.core.diagnosis.selection.assumptions import as_given
+from crash_estimator.core.diagnosis.selection.onset_search import _Search
+from crash_estimator.core.diagnosis.selection.time_zero import Shift, TimeZero
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.effects.applied import applied
 from crash_estimator.core.kinematics import initial_motion
@@ -140,5 +142,6 @@ def test_quiet_samples_before_a_stated_time_zero_are_no_gain():
 def test_a_model_that_leaves_noise_from_the_stated_time_zero_on_is_not_moved():
     model, recordings = case("side/nothing/1g/clean/71900002")
     shifts = tuple(Shift(k, one.test.id, -0.02, 1e-4, 1e-4) for k, one in enumerate(recordings))
-    stated, moved = ([observe(model, one) for one in each] for each in (recordings, moved_by(shifts, recordings)))
-    assert time_zero_wrong(model, stated, moved, shifts, EFFECTS) is None
+    search = _Search(model, recordings, EFFECTS)
+    _, given = as_given(model, search.as_stated, EFFECTS)
+    assert given.white and search._begins_early(given, shifts) is None

@@ -96,18 +96,22 @@ def true_acceleration(record: ObservedRecord, channel: str, d: Distortion) -> np
 
 def start_values(experiment: Experiment, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(b,) initial velocities and displacements, attached bodies included."""
-    v0, x0 = stated_start(experiment)
-    return v0 + sum(theta[parameter] * faster for parameter, faster in start_by(experiment)), x0
+    by = [theta[parameter] * change for parameter, change in start_by(experiment)]
+    v0, x0 = np.array(stated_start(experiment)) + sum(by)
+    return v0, x0
 
 
 def start_by(experiment: Experiment) -> list[tuple[int, np.ndarray]]:
-    """Derivatives of the initial velocities: (parameter, (b,))."""
-    layout, record, _ = experiment
+    """Their derivatives: (parameter, (2, b)). What touches late has farther to coast."""
+    layout, record, r = experiment
     index, found = layout.structure.body_index, []
+    v0, _ = stated_start(experiment)
     here = (term for term in layout.terms if term.addition.recording in ("", record.test.id))
     for term in (term for term in here if term.addition.effect.changes_start):
-        faster = term.addition.effect.start_velocity(term.addition.target, index, stated_start(experiment)[0])
-        found.append((term.coefficient, faster))
+        faster = term.addition.effect.start_velocity(term.addition.target, index, v0)
+        found.append((term.coefficient, np.array([faster, np.zeros_like(v0)])))
+    if layout.late[r] >= 0:
+        found.append((layout.late[r], np.array([np.zeros_like(v0), -v0])))
     return found
 
 

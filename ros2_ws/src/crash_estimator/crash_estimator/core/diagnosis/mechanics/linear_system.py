@@ -23,7 +23,7 @@ class Linear(NamedTuple):
     knot: np.ndarray  # (l, g, 2) of the two curve knots in use: their columns, after `others`; -1: none
     weight: np.ndarray  # (l, g, 2) dF/d(force at that knot)
     changed: np.ndarray  # (g,) bool, a slope or the step is another than at the instant before
-    start: np.ndarray  # (b, others) m/s at time zero
+    start: np.ndarray  # (2, b, others) m/s and m at time zero
     observer: float  # 1/s, rate at which free bodies are drawn to the measured motion: -o^2 xi - 2 o xi'
     others: int  # columns before those of the knots
     column: np.ndarray  # (m,) of them, in which something acts ...

@@ -110,7 +110,7 @@ def linearise(
         defect[:, free] -= observer.acceleration(trajectory)[:, free]
     for own in np.flatnonzero(~driven).tolist():
         actions.acting.append((0, own, defect[:, own]))
-    starts = {actions.columns.setdefault(p, 1 + len(actions.columns)): v for p, v in start_by(experiment)}
+    starts = {actions.columns.setdefault(p, 1 + len(actions.columns)): s for p, s in start_by(experiment)}
     linear, knots = _linear_system(experiment, forces, actions, starts, observer.rate if observer else 0.0)
     every = np.concatenate([np.array(list(actions.columns), dtype=int), knots])
     return Equations(linear, sampled, rows, every, forces)
@@ -144,7 +144,7 @@ def _linear_system(
     experiment: Experiment, forces: Sequence[LinkForce], actions: _Actions, starts: Mapping[int, np.ndarray],
     observer_rate: float,
 ) -> tuple[Linear, np.ndarray]:  # fmt: skip
-    """For the compiled passes; and the knots' parameters, in the order of their columns. starts: by column, (b,)."""
+    """For the compiled passes; and the knots' parameters, in the order of their columns. starts: by column, (2, b)."""
     layout, record, _ = experiment
     g, n = len(record.time), len(forces)
     column, body, acts = (np.array(each) for each in zip(*actions.acting, strict=True))
@@ -153,9 +153,9 @@ def _linear_system(
     memories = [memory for f in forces for memory in f.memories]
     peaks = [f.loading & f.kp.any() for f in forces]  # none is kept that nothing hangs on
     knot, order, touched = ranked(np.array([f.knot for f in forces], np.int64).reshape(n, g, 2), layout.knots)
-    start = np.zeros((len(layout.bodies), 1 + len(actions.columns)))
-    for k, velocity in starts.items():
-        start[:, k] = velocity
+    start = np.zeros((2, len(layout.bodies), 1 + len(actions.columns)))
+    for k, change in starts.items():
+        start[:, :, k] = change
     changed = np.ones(g, bool)
     changed[1:] = (np.diff(kx) != 0.0).any(axis=0) | (np.diff(kv) != 0.0).any(axis=0)
     changed[1:] |= np.abs(np.diff(record.dt)) > 1e-9 * record.step

@@ -91,6 +91,7 @@ class ObservedRecord(NamedTuple):
     below: float = np.inf  # Hz: the band that is compared
     in_doubt: bool = False  # masses may be off by what scales miss, and zeros drift
     weight: np.ndarray | None = None  # (bins, q) of the outputs' frequencies, `whitening.weights`; None: all alike
+    impact_std: float = 0.0  # s: bodies coast, and when they touch is not known better than so
 
     @property
     def noise_is_inflated(self) -> bool:

@@ -100,4 +100,5 @@ def embedding(base: Layout, wide: Layout) -> np.ndarray:
             found += wide.modes[r][body]
         found += [wide.kicks[r][body] for body in base.kicks[r]]
         found += [wide.zeros[r][body] for body in base.zeros[r]]
+        found += [wide.late[r]] if base.late[r] >= 0 else []
     return np.array(found)

@@ -46,7 +46,7 @@ def propagate(system, sampling, out):
             number[k] = free
             free += 1
         measured |= kind[k] == FIXED and inverse_mass[k] > 0.0
-    v[:, :others] = start
+    v[:, :others], x[:, :others] = start[0], start[1]
     matrix, inverse = np.zeros((free, free)), np.zeros((free, free))
     first, second = 2.0 * observer, observer**2
     for t in range(len(steps)):
@@ -175,7 +175,7 @@ def respond(system, change):
         if kind[k] == FREE:
             number[k] = free
             free += 1
-        v[k] = (start[k] * change[:others]).sum()
+        v[k], x[k] = (start[0, k] * change[:others]).sum(), (start[1, k] * change[:others]).sum()
     matrix, inverse = np.zeros((free, free)), np.zeros((free, free))
     first, second = 2.0 * observer, observer**2
     rows, found = np.zeros((len(steps), b)), np.zeros((len(steps), b))

@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from crash_replay.onset import AS_WELL
+
 from ...effects.effect import Addition
 from ...effects.kinds.body_inertia import WEIGHED_TO
 from ...effects.kinds.guide_force import GROUND
@@ -40,6 +42,11 @@ START_ERRS = 0.3
 by, and the recording itself says soon enough how the body started. Not varied: any width beyond the error does."""
 
 
+FARTHEST = 2.0 * AS_WELL**0.5
+"""Standard deviations that an onset may be off: twice as far as any that fits its signals as well. And that a signal's
+mean may be off its zero where it is said to rest."""
+
+
 class Layout(NamedTuple):
     """A fit's parameters and what they mean."""
 
@@ -58,6 +65,7 @@ class Layout(NamedTuple):
     modes: tuple[dict[int, range], ...]  # per record: driven body -> its modes, the mean first
     kicks: tuple[dict[int, int], ...]  # per record: body that starts as its own channel says -> error of its velocity
     zeros: tuple[dict[int, int], ...]  # per record: body that a measured force is applied to -> error of its zero, N
+    late: tuple[int, ...]  # per record: s by which bodies that coast touch late; -1: when they touch is known
     weighed: dict[int, int]  # in doubt: free body -> relative error of its mass
     prior: Prior
     start: np.ndarray  # (p,)
@@ -144,7 +152,7 @@ def make_layout(
     weighed = _weighed(b, structure) if records[0].in_doubt else {}
     common = len(b.parameters)
     outputs = comparable(outputs_of(structure), structure, records)
-    offsets, drifts, modes, kicks, zeros = [], [], [], [], []
+    offsets, drifts, modes, kicks, zeros, late = [], [], [], [], [], []
     for r, record in enumerate(records):
         offsets.append(len(b.parameters))
         for q in range(len(outputs)):
@@ -154,9 +162,11 @@ def make_layout(
         kicks.append(_kicks(b, structure, magnitudes.measured[r]))
         pushed = [(k, record.signals[body.applied]) for k, body in enumerate(structure.bodies) if body.applied]
         zeros.append({k: b.add("zero", 0.0, signal.offset_std) for k, signal in pushed})
+        late.append(_late(b, record))
     return Layout(
         structure, tuple(links), bodies, np.array(kind), outputs, knots, common, len(b.parameters), tuple(terms),
-        attached, tuple(offsets), tuple(drifts), tuple(modes), tuple(kicks), tuple(zeros), weighed, b.prior(),
+        attached, tuple(offsets), tuple(drifts), tuple(modes), tuple(kicks), tuple(zeros), tuple(late), weighed,
+        b.prior(),
         np.array([one.start for one in b.parameters]), tuple(one.name for one in b.parameters[knots:common]),
     )  # fmt: skip
 
@@ -278,3 +288,9 @@ def _kicks(b: Builder, structure: Structure, measured: Trajectory) -> dict[int, 
         if body.starts_as_observed:
             found[k] = b.add("kick", 0.0, START_ERRS * float(np.std(measured.v[:, k])))
     return found
+
+
+def _late(b: Builder, record: ObservedRecord) -> int:
+    """How late bodies touch that coast until then, where that is not known; not before the record begins."""
+    limit = FARTHEST * record.impact_std
+    return b.add("late", 0.0, record.impact_std, low=-limit, high=limit) if record.impact_std else -1

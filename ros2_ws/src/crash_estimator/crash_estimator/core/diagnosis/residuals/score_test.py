@@ -128,7 +128,7 @@ def _with_motion(equations: Equations, modes: np.ndarray, free: np.ndarray, firs
     acts = (acts[:, None] * modes.T).reshape(-1, len(modes))
     more, others = np.arange(len(acts)), linear.others
     wider = linear._replace(
-        start=np.pad(linear.start, ((0, 0), (0, len(acts)))),
+        start=np.pad(linear.start, ((0, 0), (0, 0), (0, len(acts)))),
         others=others + len(acts),
         column=np.concatenate([linear.column, others + more]),
         body=np.concatenate([linear.body, np.tile(np.repeat(free, MODES), 2)]),

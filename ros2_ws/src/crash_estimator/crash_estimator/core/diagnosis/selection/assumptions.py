@@ -170,7 +170,7 @@ def _as_exact_as_needed(
 
     elsewhere: whether other assumptions promise more than a first step does.
     """
-    magnitudes, given = _as_given(structure, records, effects)
+    magnitudes, given = as_given(structure, records, effects)
     if records[0].in_doubt:
         return _with_curves_as_fine_as_needed(magnitudes, given, effects, elsewhere)
     doubted = magnitudes._replace(records=[record._replace(in_doubt=True) for record in records])
@@ -189,7 +189,7 @@ def _as_exact_as_needed(
     return path
 
 
-def _as_given(
+def as_given(
     structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]
 ) -> tuple[Magnitudes, Model]:
     magnitudes = measure_magnitudes(structure, records)
