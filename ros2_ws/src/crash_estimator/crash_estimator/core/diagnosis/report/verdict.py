@@ -49,7 +49,8 @@ def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
         word = EFFECT_MISSING if evidence.added else UNEXPLAINED if evidence.assumed else ADEQUATE
         return Verdict(word if evidence.added <= THRESHOLDS.most_at_once else UNEXPLAINED, True)
     within = tolerance.admits(evidence.after)
-    if _explains(evidence) and _stands_still(evidence) and (within or _beats_its_rivals(evidence)):
+    still = _stands_still(evidence) or _leaves_next_to_nothing(evidence, within)
+    if _explains(evidence) and still and (within or _beats_its_rivals(evidence)):
         return Verdict(EFFECT_MISSING, within)
     nothing_to_add = not (evidence.added or evidence.white) and _stands_still(evidence)
     little = tolerance.admits(evidence.before) and (nothing_to_add or evidence.before.is_less_than_noise)
@@ -63,6 +64,12 @@ def _stands_still(evidence: Evidence) -> bool:
     of_little_weight = evidence.by_first > THRESHOLDS.all_but_folds
     little_of_it = not evidence.white and evidence.drift.share < THRESHOLDS.varying
     return of_little_weight or evidence.drift.constant or little_of_it
+
+
+def _leaves_next_to_nothing(evidence: Evidence, within: bool) -> bool:
+    """So little, beside the noise or the tolerance too, that what varies with time in it is no other explanation."""
+    little = within or evidence.after.is_less_than_noise
+    return little and evidence.after.share_explained(evidence.before) > THRESHOLDS.nearly_all
 
 
 def _explains(evidence: Evidence) -> bool:

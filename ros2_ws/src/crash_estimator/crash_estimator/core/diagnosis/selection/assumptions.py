@@ -5,7 +5,8 @@ that carries compression only may pull, and what still acts where that spring is
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import chain
+from dataclasses import replace
+from itertools import chain, islice
 from typing import NamedTuple
 
 import numpy as np
@@ -54,9 +55,15 @@ class SelectionPath(NamedTuple):
     def added(self) -> Sequence[Addition]:
         return self.final.found
 
+    @property
+    def furthest(self) -> Fit:
+        """In the sensors' noise: of the final model, or of the best first candidate where none was added yet."""
+        best = None if self.whole else self.steps[0].best
+        return best.fit if best else self.as_recorded
+
     def rank(self) -> tuple[bool, bool, float]:
         """Of paths under different assumptions the largest is believed."""
-        return self.final.white, self.whole, self.as_recorded.evidence
+        return self.final.white, self.whole, self.furthest.evidence
 
 
 def select(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
@@ -65,12 +72,25 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
     path = _selected(structure, records, effects)
     if path.final.white or search_is_over():
         return path
-    left = analyse(path.as_recorded)
-    vibration = vibrates_from(left, records)
-    if vibration == np.inf or left.mean_square >= THRESHOLDS.near_floor:
+    vibration, added = _vibration(path)
+    if vibration == np.inf:
         return path
     below = [record.in_band(vibration) for record in records]
-    return _selected(structure, below, found_as_common(effects, path.added))
+    in_band = _selected(path.structure, below, found_as_common(effects, added))
+    return path if path.whole and search_is_over() and not in_band.final.white else in_band
+
+
+def _rings(begun: SelectionPath) -> bool:
+    return _vibration(begun)[0] < np.inf
+
+
+def _vibration(path: SelectionPath) -> tuple[float, Sequence[Addition]]:
+    """Hz from which on vibration is left, where that may be all and all was compared; and what else was found, or would
+    be first."""
+    left, best = analyse(path.furthest), None if path.whole else path.steps[0].best
+    added = [best.addition] if best else path.added
+    may_be_all = path.records[0].below == np.inf and left.mean_square < THRESHOLDS.near_floor
+    return vibrates_from(left, path.records) if may_be_all else np.inf, added
 
 
 def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
@@ -93,11 +113,11 @@ def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: 
 
     tried = [structure]
     untried: list[Callable[[Structure], Structure]] = [never_pulling, elastic_when_spent, all_when_spent]
-    path = _as_exact_as_needed(structure, records, effects, elsewhere=lambda begun: bool(promised(begun)))
+    path = _as_exact_as_needed(structure, records, effects, lambda begun: _rings(begun) or bool(promised(begun)))
     while untried and not search_is_over() and (others := promised(path)):
         best = max(others, key=others.__getitem__)
         untried.remove(best)
-        otherwise = _as_exact_as_needed(best(path.structure), path.records, effects)
+        otherwise = _as_exact_as_needed(best(path.structure), path.records, effects, _rings)
         tried.append(otherwise.structure)
         path = max(path, otherwise, key=SelectionPath.rank)
     return path
@@ -136,10 +156,12 @@ def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedR
     models = [step.before for step in path.steps]
     models = models if models[-1] is final else [*models, final]
     found = ((model.additions, in_the_sensors_noise(model, records)) for model in models)
+    felt = ((additions, one) for additions, one in found if moves_otherwise(one, other))
+    likely = ((additions, one) for additions, one in _likely(path) if moves_otherwise(one, other))
     most, seen = -np.inf, set()
-    for additions, as_recorded in chain(found, _likely(path)):
-        what = frozenset(one.key for one in additions)
-        if what in seen or not moves_otherwise(as_recorded, other):
+    for additions, as_recorded in chain(felt, islice(likely, THRESHOLDS.few)):
+        what = frozenset((one.key, one.variant) for one in additions)
+        if what in seen:
             continue
         seen.add(what)
         otherwise = fit(make_problem(magnitudes, records, additions))
@@ -151,14 +173,26 @@ def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedR
 
 
 def _likely(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]]:
-    """The best first candidates, as another than the right one may have come first; where one leaves noise, those that
-    explain nearly as much."""
+    """The best first candidates, as another than the right one may have come first, in all their forms; where one
+    leaves noise, those that explain nearly as much."""
     first = path.steps[0]
+    magnitudes = measure_magnitudes(path.structure, path.records, path.cells)
     fitted = [one for one in first.as_recorded if one.fit]
     if path.final.white:
         fitted = [one for one in fitted if one.gain > (1.0 - THRESHOLDS.least_share) * fitted[0].gain]
-    for one in fitted[: THRESHOLDS.few]:
-        yield (*first.before.additions, as_found(one)), one.fit
+    for one in fitted:
+        addition = as_found(one)
+        yield (*first.before.additions, addition), one.fit
+        for other in _in_other_forms(addition):
+            additions = (*first.before.additions, other)
+            yield additions, fit(make_problem(magnitudes, path.records, additions))
+
+
+def _in_other_forms(addition: Addition) -> Iterator[Addition]:
+    """With the same constants: the form that leaves least under some contacts may be another one than under others."""
+    effect = addition.effect
+    alike = (v for v in effect.variants if v != addition.variant and [*effect.shapes_of(v)] == [*addition.shapes])
+    yield from (replace(addition, variant=variant) for variant in alike)
 
 
 def _as_exact_as_needed(
