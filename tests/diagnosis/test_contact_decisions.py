@@ -1,5 +1,6 @@
 """Which contacts are assumed otherwise: the fits are made up, what is tried after them is judged."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,6 +9,8 @@ from helpers_made_up_fits import model
 
 from crash_estimator.core.diagnosis import THRESHOLDS
 from crash_estimator.core.diagnosis.selection import assumptions
+from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.effects.effect import Addition
 
 
 def test_what_other_contacts_promise_of_a_path_is_worked_out_once(monkeypatch):
@@ -42,7 +45,7 @@ def with_contacts(monkeypatch, promised, noise_under="none", ends_early=False) -
     def search(structure, records, effects, elsewhere=lambda path: False):
         searched.append(structure)
         final = model(white=structure == noise_under)
-        path = assumptions.SelectionPath(structure, [], final, final.fit, (), 36)
+        path = assumptions.SelectionPath(structure, [SimpleNamespace(best=None)], final, final.fit, (), 36)
         begun = path._replace(whole=False)
         return begun if ends_early and elsewhere(begun) else path
 
@@ -51,27 +54,62 @@ def with_contacts(monkeypatch, promised, noise_under="none", ends_early=False) -
     monkeypatch.setattr(assumptions, "_promised", lambda other, *given: promised.get(other, -np.inf))
     monkeypatch.setattr(assumptions, "search_is_over", lambda: False)
     monkeypatch.setattr(assumptions, "_as_exact_as_needed", search)
+    monkeypatch.setattr(assumptions, "_rings", lambda begun: False)
     return searched
 
 
-@pytest.mark.parametrize(("gain", "cost", "promises"), [
-    (0.9, 1000.0, False),  # less than any candidate must gain
-    (1.1, 1000.0, True),
-    (1.1, 200_000.0, False),  # nothing beside what is left above the noise of a thousand samples
+@pytest.mark.parametrize(("gain", "cost", "best_first", "promises"), [
+    (0.9, 1000.0, -np.inf, False),  # less than any candidate must gain
+    (1.1, 1000.0, -np.inf, True),
+    (1.1, 200_000.0, -np.inf, False),  # nothing beside what is left above the noise of a thousand samples
+    (1.1, 1000.0, 2.0 * THRESHOLDS.gain, False),  # less than another effect explains under the contacts as they are
 ])  # fmt: skip
-def test_other_contacts_must_explain_a_share_of_what_is_above_the_noise(monkeypatch, gain, cost, promises):
-    one = SimpleNamespace(key=("one", "element"))
+def test_other_contacts_must_explain_a_share_of_what_is_above_the_noise(monkeypatch, gain, cost, best_first, promises):
+    one = SimpleNamespace(key=("one", "element"), variant="")
     final = model(cost=cost, additions=(one,))
     record = SimpleNamespace(bins=500, measured=np.zeros((1, 2)))
+    best = SimpleNamespace(fit=SimpleNamespace(evidence=best_first))
     path = SimpleNamespace(
-        structure="as stated", added=(one,), final=final, cells=36, steps=[SimpleNamespace(before=final)],
-        as_recorded=final.fit,
+        structure="as stated", added=(one,), final=final, cells=36, as_recorded=final.fit, whole=True,
+        steps=[SimpleNamespace(before=final, as_recorded=[best])],
     )  # fmt: skip
-    otherwise = SimpleNamespace(evidence=gain * THRESHOLDS.gain)
+    with_fits(monkeypatch, gain * THRESHOLDS.gain)
+    monkeypatch.setattr(assumptions, "moves_otherwise", lambda *given: True)
+    assert np.isfinite(assumptions._promised("other", path, [record])) == promises
+
+
+def test_candidates_that_contacts_concern_are_asked_behind_those_that_they_do_not(monkeypatch):
+    """A speed, a mass and a force explained more of a Maxwell element than the damper whose contact was wrong."""
+    given = model(additions=())
+    keys = ("speed", "mass", "force", "damper")
+    candidates = [
+        (SimpleNamespace(key=(key, "car"), variant=""), SimpleNamespace(evidence=0.0, cost=1000.0, name=key))
+        for key in keys
+    ]
+    path = SimpleNamespace(
+        structure="as stated", added=(), final=given, cells=36, as_recorded=given.fit, whole=False,
+        steps=[SimpleNamespace(before=given)],
+    )  # fmt: skip
+    record = SimpleNamespace(bins=500, measured=np.zeros((1, 2)))
+    with_fits(monkeypatch, 2.0 * THRESHOLDS.gain, [([one], fitted) for one, fitted in candidates])
+    monkeypatch.setattr(assumptions, "moves_otherwise", lambda fitted, other: getattr(fitted, "name", "") == "damper")
+    assert assumptions._promised("other", path, [record]) == 2.0 * THRESHOLDS.gain
+
+
+def with_fits(monkeypatch, evidence, likely=()):
+    """All models are fitted with as much evidence under other contacts."""
+    otherwise = SimpleNamespace(evidence=evidence)
     monkeypatch.setattr(assumptions, "measure_magnitudes", lambda *given: None)
     monkeypatch.setattr(assumptions, "in_the_sensors_noise", lambda model, records: model.fit)
-    monkeypatch.setattr(assumptions, "_likely", lambda path: ())
-    monkeypatch.setattr(assumptions, "moves_otherwise", lambda *given: True)
+    monkeypatch.setattr(assumptions, "_likely", lambda path: likely)
     monkeypatch.setattr(assumptions, "make_problem", lambda *given: None)
     monkeypatch.setattr(assumptions, "fit", lambda problem: otherwise)
-    assert np.isfinite(assumptions._promised("other", path, [record])) == promises
+
+
+def test_a_stop_is_asked_of_in_both_its_forms():
+    """One inside the curve leaves least under contacts in which the one beside it stops short."""
+    stop = Addition(EFFECTS["bottoming_out"], "front", shapes={"stop": 0.4}, variant="in_curve")
+    (other,) = assumptions._in_other_forms(stop)
+    assert other == replace(stop, variant="")
+    uneven = Addition(EFFECTS["viscous_damping"], "front", shapes={"rebound": 0.4}, variant="uneven")
+    assert not [*assumptions._in_other_forms(uneven)], "its constant is none of the other forms'"

@@ -83,7 +83,7 @@ def test_an_early_onset_is_not_taken_where_only_what_is_found_without_it_leaves_
     search = onset_search._Search
     monkeypatch.setattr(onset_search, "onsets", lambda recordings: (early,))
     monkeypatch.setattr(onset_search, "as_given", lambda *given: (None, SimpleNamespace(white=False)))
-    monkeypatch.setattr(search, "in_doubt", SimpleNamespace(noise=False))
+    monkeypatch.setattr(search, "in_doubt", SimpleNamespace(added=[None, None]))
     monkeypatch.setattr(search, "_begins_early", lambda self, given, early: "moved")
     monkeypatch.setattr(search, "_may_begin_elsewhere", lambda self, path, elsewhere: False)
     monkeypatch.setattr(search, "_observed", lambda self, shifts=(): moved if shifts else stated)

@@ -189,13 +189,13 @@ class Rows(NamedTuple):
 
 def test_directions_of_masses_and_forces_stand_after_the_parameters_and_before_the_knots():
     """Two parameters and two knots; each mode once for the free body's mass, once for the force on it."""
-    linear = Columns(np.ones((2, 3)), 3, np.array([0, 1]), np.array([0, 1]), np.zeros((2, 4)))
+    linear = Columns(np.ones((2, 2, 3)), 3, np.array([0, 1]), np.array([0, 1]), np.zeros((2, 4)))
     equations = Rows(linear, np.array([[1.0, 9.0], [-3.0, 9.0], [2.0, 9.0], [0.0, 9.0]]), np.array([0, 1, 30, 31]))
     modes = np.cos(np.pi * np.arange(1, MODES + 1) * (np.arange(4) / 4.0)[:, None])
     found = _with_motion(equations, modes, [0], first=40)
     assert found.columns.tolist() == [0, 1, *range(40, 40 + 2 * MODES), 30, 31]
     assert found.linear.others == 3 + 2 * MODES
-    assert found.linear.start.tolist() == [[1.0] * 3 + [0.0] * 2 * MODES] * 2  # they change no body's start
+    assert found.linear.start.tolist() == [[[1.0] * 3 + [0.0] * 2 * MODES] * 2] * 2  # they change no body's start
     assert found.linear.column.tolist() == [0, 1, *range(3, 3 + 2 * MODES)]
     assert found.linear.body.tolist() == [0, 1] + [0] * 2 * MODES
     assert_allclose(found.linear.acts[2], -equations.rows[:, 0] * modes[:, 0])

@@ -67,9 +67,10 @@ def _stands_still(evidence: Evidence) -> bool:
 
 
 def _leaves_next_to_nothing(evidence: Evidence, within: bool) -> bool:
-    """So little, beside the noise or the tolerance too, that what varies with time in it is no other explanation."""
+    """One effect leaves so little, beside the noise or the tolerance too, that what varies with time in it is no other
+    explanation."""
     little = within or evidence.after.is_less_than_noise
-    return little and evidence.after.share_explained(evidence.before) > THRESHOLDS.nearly_all
+    return evidence.added == 1 and little and evidence.after.share_explained(evidence.before) > THRESHOLDS.nearly_all
 
 
 def _explains(evidence: Evidence) -> bool:

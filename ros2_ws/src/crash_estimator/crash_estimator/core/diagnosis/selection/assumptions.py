@@ -168,8 +168,12 @@ def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedR
         misfit = 0.5 * max(as_recorded.cost - cost_of_noise(records), 0.0)  # nats
         if otherwise.evidence > as_recorded.evidence + THRESHOLDS.gain + THRESHOLDS.least_share * misfit:
             most = max(most, otherwise.evidence)
-    in_question = not final.white or len(path.added) > THRESHOLDS.most_at_once
-    return most if in_question or most > path.as_recorded.evidence else -np.inf
+    if final.white and len(path.added) <= THRESHOLDS.most_at_once:
+        least = path.as_recorded.evidence
+    else:  # another effect may have been right, had it come first
+        best = path.steps[0].as_recorded[:1] if path.whole else ()
+        least = max((one.fit.evidence for one in best if one.fit), default=-np.inf)
+    return most if most > least else -np.inf
 
 
 def _likely(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]]:

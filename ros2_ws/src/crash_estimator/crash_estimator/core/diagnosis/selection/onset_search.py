@@ -21,7 +21,7 @@ from .acceptance import share_removed
 from .assumptions import SelectionPath, as_given, first_believed, select
 from .fitted_model import Model
 from .forward_selection import first_step
-from .search_limit import search_is_over
+from .search_limit import half_of_what_is_left, search_is_over
 from .thresholds import THRESHOLDS
 from .time_zero import Shift, TimeZero, coasting, moved_by, onsets, touching
 
@@ -57,10 +57,10 @@ class _Search:
         elsewhere = tuple(shift for shift in self.begins if shift.differs)
         early = tuple(shift for shift in elsewhere if shift.off(0.0) > 0.0)
         zero = touched = None
-        if elsewhere:
+        if any(shift.off(0.0) for shift in elsewhere):
             magnitudes, given = as_given(self.structure, self.as_stated, self.effects)
             zero = self._begins_early(given, early) if early else None
-            if not given.white and self.in_doubt.noise and len(self.in_doubt.added) <= 1:
+            if not given.white and len(self.in_doubt.added) <= 1 and _leaves_about_noise(self.in_doubt):
                 if zero or not first_step(magnitudes, self.effects, given).leaves_noise:
                     touched = self._from_the_touch(given)
             if touched and touched.path.noise:
@@ -101,9 +101,9 @@ class _Search:
         by = {shift.recording: shift for shift in self.begins}
         moved = [coasting(one, by[k]) if k in by else one for k, one in enumerate(self.recordings)]
         records = self._at_rest_before(moved)
-        return self._selected(
-            [r._replace(impact_std=by[k].impact[1] if k in by else 0.0) for k, r in enumerate(records)]
-        )
+        stds = [by[k].impact[1] if k in by else 0.0 for k in range(len(moved))]
+        with half_of_what_is_left():
+            return self._selected([one._replace(impact_std=std) for one, std in zip(records, stds, strict=True)])
 
     def _from_the_touch(self, as_stated: Model) -> Begun | None:
         """From where bodies touch; None where what moves would be left out, or no less is left than from the stated
@@ -152,6 +152,10 @@ class _Search:
 def _left_by(path: SelectionPath) -> Residuals:
     """In the sensors' noise."""
     return analyse(path.as_recorded)
+
+
+def _leaves_about_noise(path: SelectionPath) -> bool:
+    return path.noise or _left_by(path).mean_square < THRESHOLDS.near_floor
 
 
 def _better(one: SelectionPath, other: SelectionPath) -> bool:

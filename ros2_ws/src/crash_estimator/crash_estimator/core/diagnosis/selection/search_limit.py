@@ -28,6 +28,18 @@ def search_limit(seconds: float | None) -> Iterator[None]:
         _end.reset(token)
 
 
+@contextmanager
+def half_of_what_is_left() -> Iterator[None]:
+    """For a search within another one, which goes on after it."""
+    deadline, most = _end.get()
+    now, made = monotonic(), iterations_made()
+    token = _end.set((now + 0.5 * (deadline - now), made + 0.5 * (most - made)))
+    try:
+        yield
+    finally:
+        _end.reset(token)
+
+
 def search_is_over() -> bool:
     """Whether no further fit is to be begun."""
     deadline, most = _end.get()

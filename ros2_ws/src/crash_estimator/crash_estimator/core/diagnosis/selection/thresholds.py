@@ -89,10 +89,10 @@ class Thresholds(NamedTuple):
     five looked-at cases of a Maxwell element it explained 0.80 to 0.93, in one of them under other contacts than stated
     (0.54 under those); where a real impactor has a damper 0.07 to 0.21 near the noise, and up to 0.54 far from it."""
     nearly_all: float = 0.99
-    """Share of the misfit from which what is left may vary with time, if it is within the tolerance: sensors on mounts
-    that ring are off by some 0.5 % in the band below. Of 105 looked-at cases outside the vocabulary of both simulators
-    what was added explained 0.987 at most, and within the tolerance 0.969; of right answers beside ringing mounts that
-    were `unexplained` for it 0.997 and more."""
+    """Share of the misfit from which what one effect leaves may vary with time, if it is within the tolerance or less
+    than the noise: sensors on mounts that ring are off by some 0.5 % in the band below. Of 105 looked-at cases outside
+    the vocabulary of both simulators one effect explained 0.981 at most; of right answers beside ringing mounts that
+    were `unexplained` for it 0.997 and more. Two that stood for a third explained 0.997."""
     varying: float = 0.45
     """Share of what is left that goes along with something varying in time: from it on no effect is named. Of 15
     development cases outside the vocabulary to which an effect was added 7 had 0.55 and more, and 0.36 at most those
