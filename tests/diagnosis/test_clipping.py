@@ -35,7 +35,7 @@ def test_what_is_clipped_is_found_and_nothing_else(padded):
     end = 0.6 * np.nanmax(np.abs(values))
     lost = clipped(np.clip(values, -end, end))
     beyond = np.abs(values) >= end
-    np.testing.assert_array_equal(lost, beyond)
+    assert lost[beyond].all() and np.abs(values[lost]).min() > 0.8 * end, "and what is beside it, as close as noise"
     assert not any(clipped(column).any() for column in padded.values.T)
 
 
@@ -46,8 +46,22 @@ def test_a_level_that_noise_would_not_leave_is_the_end_of_the_range_also_where_i
     pulse = 150.0 * np.sin(np.pi * np.clip(np.arange(3000) / 2000, 0.0, 1.0)) + rng.normal(0.0, noise * step, 3000)
     recorded = np.round(np.clip(pulse, None, 130.0) / step) * step
     lost = clipped(recorded)
-    np.testing.assert_array_equal(lost, recorded == 130.0)
+    assert lost[recorded == 130.0].all() and recorded[lost].min() > 130.0 - 8.0 * noise * step
     assert lost.sum() > 300 and not clipped(np.round(pulse / step) * step).any()
+
+
+def test_what_is_left_beside_the_end_of_a_range_is_as_high_as_it_was():
+    """Near the end those that are not at it are the low ones: in a pulse that leaves it slowly by ten standard deviations
+    of their mean."""
+    noise, pulse = 20.0, 1500.0 * np.sin(np.pi * np.arange(6000) / 6000)
+    low, alone = [], []
+    for seed in range(20):
+        recorded = np.clip(pulse + np.random.default_rng(seed).normal(0.0, noise, len(pulse)), None, 1480.0)
+        lost, at_end = clipped(recorded), recorded == 1480.0
+        beside = np.convolve(at_end, np.ones(401), "same") > 0.0
+        for found, left in ((low, beside & ~lost), (alone, beside & ~at_end)):
+            found.append((recorded - pulse)[left].sum() / (noise * np.sqrt(left.sum())))
+    assert abs(np.mean(low)) < 3.0 / np.sqrt(20) < 8.0 < -np.mean(alone), (np.mean(low), np.mean(alone))
 
 
 def test_holes_numbers_of_coarse_steps_and_what_has_no_noise_are_not_clipped():

@@ -18,12 +18,16 @@ FINER = 1e-5
 """Of the largest value: a channel whose noise is less has none, and what is level in it may be the truth."""
 FEWEST = 40
 """Samples beside them that tell whether there is noise, to a tenth."""
+BESIDE = 3.0
+"""Standard deviations of the noise below an end at which one sample in 700 is still at it. Nearer than that those that
+are not at it are the low ones; with 2 what is left of a looked-at pulse is one deviation of its mean too low."""
 MOST = 0.5
 """Share of the samples: of what is at its end for longer nothing else is known, and it is left as it is."""
 
 
 def clipped(values: np.ndarray) -> np.ndarray:
-    """(n,) bool: which of values (n,), NaN where not valid, are at an extreme that is reached RUN times in a row."""
+    """(n,) bool: which of values (n,), NaN where not valid, are at an extreme that is reached RUN times in a row, or
+    beside such as close to it as the noise is large."""
     found = np.zeros(len(values), dtype=bool)
     valid = np.isfinite(values)
     if not valid.any():
@@ -34,9 +38,23 @@ def clipped(values: np.ndarray) -> np.ndarray:
     step = np.diff(np.unique(values[valid])).min(initial=np.inf)
     for there in extremes:
         if _is_no_chance(there, noise / step) or _comes_suddenly(values, there, step):
-            found |= there
+            found |= _with_those_beside(values, there, BESIDE * noise)
     believed = noise > FINER * np.nanmax(np.abs(values)) and found.mean() < MOST
     return found if believed else np.zeros(len(values), dtype=bool)
+
+
+def _with_those_beside(values: np.ndarray, there: np.ndarray, near: float) -> np.ndarray:
+    """With the samples among and beside those at an end whose mean over some is near it: one by one only noise tells
+    which of them are at it, and those that are not are too low."""
+    valid, some = np.isfinite(values), np.ones(2 * RUN + 1)
+    count = np.convolve(valid, some, "same")
+    mean = np.convolve(np.where(valid, values, 0.0), some, "same") / np.maximum(count, 1.0)
+    close = there | ((count > 0.0) & (np.abs(mean - values[there][0]) < near))
+    runs = runs_of(close)
+    found = np.zeros(len(values), bool)
+    for start, stop in runs[[there[start:stop].any() for start, stop in runs]]:
+        found[start:stop] = valid[start:stop]
+    return found
 
 
 def _stays(there: np.ndarray) -> bool:
