@@ -102,8 +102,7 @@ def with_fits(monkeypatch, evidence, likely=()):
     monkeypatch.setattr(assumptions, "measure_magnitudes", lambda *given: None)
     monkeypatch.setattr(assumptions, "in_the_sensors_noise", lambda model, records: model.fit)
     monkeypatch.setattr(assumptions, "_likely", lambda path: likely)
-    monkeypatch.setattr(assumptions, "make_problem", lambda *given: None)
-    monkeypatch.setattr(assumptions, "fit", lambda problem: otherwise)
+    monkeypatch.setattr(assumptions, "_fitted_slowly", lambda *given: otherwise)
 
 
 def test_a_stop_is_asked_of_in_both_its_forms():

@@ -14,6 +14,7 @@ import numpy as np
 from ...effects.effect import Addition, Effect
 from ...structure import Structure
 from ..observation.record import ObservedRecord
+from ..output_error.continuation import SLOW_CONTACT
 from ..output_error.gauss_newton import Fit, fit
 from ..output_error.problem import make_problem
 from ..parameterization.magnitudes import CELLS, Magnitudes, measure_magnitudes
@@ -23,12 +24,12 @@ from ..residuals.score_test import drift_of
 from ..residuals.vibration import vibrates_from
 from .acceptance import cost_of_noise, share_removed
 from .contacts import all_when_spent, elastic_when_spent, moves_otherwise, never_pulling
-from .fitted_model import Model, fit_given, fit_model
+from .fitted_model import Model, fit_given, fit_model, forces_jump
 from .forward_selection import first_step, forward_selection
 from .pruning import up_to_the_least_error
 from .rare_effects import found_as_common
 from .search_limit import search_is_over
-from .selection_step import SelectionStep, as_found, sized_models
+from .selection_step import SelectionStep, sized_models
 from .thresholds import THRESHOLDS
 
 FINER_CELLS = 2 * CELLS
@@ -164,7 +165,7 @@ def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedR
         if what in seen:
             continue
         seen.add(what)
-        otherwise = fit(make_problem(magnitudes, records, additions))
+        otherwise = _fitted_slowly(magnitudes, records, additions)
         misfit = 0.5 * max(as_recorded.cost - cost_of_noise(records), 0.0)  # nats
         if otherwise.evidence > as_recorded.evidence + THRESHOLDS.gain + THRESHOLDS.least_share * misfit:
             most = max(most, otherwise.evidence)
@@ -176,6 +177,15 @@ def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedR
     return most if most > least else -np.inf
 
 
+def _fitted_slowly(magnitudes: Magnitudes, records: Sequence[ObservedRecord], additions: Sequence[Addition]) -> Fit:
+    """With care for forces that jump at a contact."""
+    problem = make_problem(magnitudes, records, additions)
+    found = fit(problem)
+    if not forces_jump(problem.layout):
+        return found
+    return max(found, fit(problem, found.point, SLOW_CONTACT), key=lambda one: one.evidence)
+
+
 def _likely(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]]:
     """The best first candidates, as another than the right one may have come first, in all their forms; where one
     leaves noise, those that explain nearly as much."""
@@ -184,10 +194,9 @@ def _likely(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]]:
     fitted = [one for one in first.as_recorded if one.fit]
     if path.final.white:
         fitted = [one for one in fitted if one.gain > (1.0 - THRESHOLDS.least_share) * fitted[0].gain]
-    for one in fitted:
-        addition = as_found(one)
-        yield (*first.before.additions, addition), one.fit
-        for other in _in_other_forms(addition):
+    for one in fitted:  # from where it began: what it has come to may be what made up for the contact
+        yield (*first.before.additions, one.addition), one.fit
+        for other in _in_other_forms(one.addition):
             additions = (*first.before.additions, other)
             yield additions, fit(make_problem(magnitudes, path.records, additions))
 
