@@ -51,8 +51,8 @@ def test_a_level_that_noise_would_not_leave_is_the_end_of_the_range_also_where_i
 
 
 def test_what_is_left_beside_the_end_of_a_range_is_as_high_as_it_was():
-    """Near the end those that are not at it are the low ones: in a pulse that leaves it slowly by ten standard deviations
-    of their mean."""
+    """Near the end those that are not at it are the low ones: in a pulse that leaves it slowly by ten standard
+    deviations of their mean."""
     noise, pulse = 20.0, 1500.0 * np.sin(np.pi * np.arange(6000) / 6000)
     low, alone = [], []
     for seed in range(20):

@@ -159,6 +159,7 @@ def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedR
     found = ((model.additions, in_the_sensors_noise(model, records)) for model in models)
     felt = ((additions, one) for additions, one in found if moves_otherwise(one, other))
     likely = ((additions, one) for additions, one in _likely(path) if moves_otherwise(one, other))
+    first = max((one.fit.evidence for one in path.steps[0].as_recorded[:1] if one.fit), default=-np.inf)
     most, seen = -np.inf, set()
     for additions, as_recorded in chain(felt, islice(likely, THRESHOLDS.few)):
         what = frozenset((one.key, one.variant) for one in additions)
@@ -167,14 +168,13 @@ def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedR
         seen.add(what)
         otherwise = _fitted_slowly(magnitudes, records, additions)
         misfit = 0.5 * max(as_recorded.cost - cost_of_noise(records), 0.0)  # nats
-        if otherwise.evidence > as_recorded.evidence + THRESHOLDS.gain + THRESHOLDS.least_share * misfit:
+        # what stays behind the best of all must gain most of what it lacked
+        share = THRESHOLDS.least_share if otherwise.evidence > first else THRESHOLDS.leading_share
+        if otherwise.evidence > as_recorded.evidence + THRESHOLDS.gain + share * misfit:
             most = max(most, otherwise.evidence)
     if final.white and len(path.added) <= THRESHOLDS.most_at_once:
-        least = path.as_recorded.evidence
-    else:  # another effect may have been right, had it come first
-        best = path.steps[0].as_recorded[:1] if path.whole else ()
-        least = max((one.fit.evidence for one in best if one.fit), default=-np.inf)
-    return most if most > least else -np.inf
+        return most if most > path.as_recorded.evidence else -np.inf
+    return most if most > first or not path.whole else -np.inf
 
 
 def _fitted_slowly(magnitudes: Magnitudes, records: Sequence[ObservedRecord], additions: Sequence[Addition]) -> Fit:
