@@ -51,9 +51,8 @@ class _Search:
     effects: Mapping[str, Effect]
 
     def begun(self) -> Begun:
-        """From where bodies touch, where that explains what no effect does from the stated time zeros on. Else from
-        these; or from an onset where that comes first and the model leaves less so, unless what is found from the
-        stated ones leaves noise and that does not; or from where bodies touch after all, where that is better."""
+        """From where bodies touch, where that explains what no effect does from the stated time zeros on; else as
+        stated, or from an onset before that; or from where bodies touch after all, where that is better."""
         elsewhere = tuple(shift for shift in self.begins if shift.differs)
         early = tuple(shift for shift in elsewhere if shift.off(0.0) > 0.0)
         zero = touched = None
@@ -65,17 +64,23 @@ class _Search:
                     touched = self._from_the_touch(given)
             if touched and touched.path.noise:
                 return touched
-        if zero:
-            unused = tuple(shift for shift in elsewhere if shift not in early)
-            found = Begun(self._selected(self._observed(early)), zero, unused)
-        if not zero or not (found.path.noise or search_is_over()):
-            stated = Begun(self._selected(self.as_stated), None, elsewhere)
-            found = stated if not zero or stated.path.noise else found
+        found = self._stated_or_early(zero, elsewhere)
         if search_is_over() or not self._may_begin_elsewhere(found.path, elsewhere):
             return found
         if not touched and _better(self.in_doubt, found.path):
             touched = self._from_the_touch(zero.as_stated if zero else found.path.steps[0].before)
         return touched if touched and _better(touched.path, found.path) else found
+
+    def _stated_or_early(self, zero: TimeZero | None, elsewhere: tuple[Shift, ...]) -> Begun:
+        """From onsets that come before the stated time zeros, unless what is found from these leaves noise and that
+        does not; without any from the stated ones on."""
+        if zero:
+            others = tuple(shift for shift in elsewhere if shift not in zero.shifts)
+            early = Begun(self._selected(self._observed(zero.shifts)), zero, others)
+            if early.path.noise or search_is_over():
+                return early
+        stated = Begun(self._selected(self.as_stated), None, elsewhere)
+        return stated if not zero or stated.path.noise else early
 
     def _begins_early(self, given: Model, early: tuple[Shift, ...]) -> TimeZero | None:
         """None where the model as given leaves noise only, or hardly less from the onsets on."""

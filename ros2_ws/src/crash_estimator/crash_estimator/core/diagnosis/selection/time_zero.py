@@ -4,8 +4,9 @@ Whoever states it reads a contact switch, a flash or a curve, and may be some ms
 no model can follow: its bodies are at rest, or coast, until then. Where they begin after it, a gap that closes says the
 same, and a delay; that is told, and left to them, unless only from the onset on nothing but noise is left.
 
-An onset is where signals stand out of their noise, which a rise that begins gently does late. A model that
-is right says sharper when its motion began: what it leaves is least from there on.
+An onset is where signals stand out of their noise, which a rise that begins gently does late. A model that is right
+says sharper when its motion began: bodies coast until they touch, and are as much farther away at the record's first
+sample as they touch late. A fit in which that is open says when, together with all else that it finds (`Layout.late`).
 """
 
 from collections.abc import Sequence
