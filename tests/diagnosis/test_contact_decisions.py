@@ -8,7 +8,7 @@ import pytest
 from helpers_made_up_fits import model
 
 from crash_estimator.core.diagnosis import THRESHOLDS
-from crash_estimator.core.diagnosis.selection import assumptions
+from crash_estimator.core.diagnosis.selection import assumptions, contact_promise
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.effects.effect import Addition
 
@@ -16,7 +16,7 @@ from crash_estimator.core.effects.effect import Addition
 def test_what_other_contacts_promise_of_a_path_is_worked_out_once(monkeypatch):
     asked = []
     with_contacts(monkeypatch, {"b": 3.0}, ends_early=True)
-    monkeypatch.setattr(assumptions, "_promised", lambda other, *given: asked.append(other) or 3.0 * (other == "b"))
+    monkeypatch.setattr(assumptions, "promised_by", lambda other, *given: asked.append(other) or 3.0 * (other == "b"))
     assumptions._selected("stated", (), {})
     assert asked[:3] == ["a", "b", "c"] and asked.count("b") == 1
 
@@ -51,7 +51,7 @@ def with_contacts(monkeypatch, promised, noise_under="none", ends_early=False) -
 
     for name, short in (("never_pulling", "a"), ("elastic_when_spent", "b"), ("all_when_spent", "c")):
         monkeypatch.setattr(assumptions, name, lambda structure, short=short: short)
-    monkeypatch.setattr(assumptions, "_promised", lambda other, *given: promised.get(other, -np.inf))
+    monkeypatch.setattr(assumptions, "promised_by", lambda other, *given: promised.get(other, -np.inf))
     monkeypatch.setattr(assumptions, "search_is_over", lambda: False)
     monkeypatch.setattr(assumptions, "_as_exact_as_needed", search)
     monkeypatch.setattr(assumptions, "_rings", lambda begun: False)
@@ -74,8 +74,8 @@ def test_other_contacts_must_explain_a_share_of_what_is_above_the_noise(monkeypa
         steps=[SimpleNamespace(before=final, as_recorded=[best])],
     )  # fmt: skip
     with_fits(monkeypatch, gain * THRESHOLDS.gain)
-    monkeypatch.setattr(assumptions, "moves_otherwise", lambda *given: True)
-    assert np.isfinite(assumptions._promised("other", path, [record])) == promises
+    monkeypatch.setattr(contact_promise, "moves_otherwise", lambda *given: True)
+    assert np.isfinite(contact_promise.promised_by("other", path, [record])) == promises
 
 
 @pytest.mark.parametrize(("gains", "promises"), [(0.4, False), (0.6, True), (1.1, True)])
@@ -93,23 +93,23 @@ def test_candidates_that_contacts_concern_are_asked_behind_those_that_they_do_no
     record = SimpleNamespace(bins=500, measured=np.zeros((1, 2)))
     likely = [([SimpleNamespace(key=(key, "car"), variant="")], fitted) for key, fitted in fits.items()]
     with_fits(monkeypatch, -1000.0 + 1000.0 * gains, likely)
-    monkeypatch.setattr(assumptions, "moves_otherwise", lambda fitted, other: getattr(fitted, "name", "") == "damper")
-    assert np.isfinite(assumptions._promised("other", path, [record])) == promises
+    monkeypatch.setattr(contact_promise, "moves_otherwise", lambda one, other: getattr(one, "name", "") == "damper")
+    assert np.isfinite(contact_promise.promised_by("other", path, [record])) == promises
 
 
 def with_fits(monkeypatch, evidence, likely=()):
     """All models are fitted with as much evidence under other contacts."""
     otherwise = SimpleNamespace(evidence=evidence)
-    monkeypatch.setattr(assumptions, "measure_magnitudes", lambda *given: None)
-    monkeypatch.setattr(assumptions, "in_the_sensors_noise", lambda model, records: model.fit)
-    monkeypatch.setattr(assumptions, "_likely", lambda path: likely)
-    monkeypatch.setattr(assumptions, "_fitted_slowly", lambda *given: otherwise)
+    monkeypatch.setattr(contact_promise, "measure_magnitudes", lambda *given: None)
+    monkeypatch.setattr(contact_promise, "in_the_sensors_noise", lambda model, records: model.fit)
+    monkeypatch.setattr(contact_promise, "_likely", lambda path: likely)
+    monkeypatch.setattr(contact_promise, "_fitted_slowly", lambda *given: otherwise)
 
 
 def test_a_stop_is_asked_of_in_both_its_forms():
     """One inside the curve leaves least under contacts in which the one beside it stops short."""
     stop = Addition(EFFECTS["bottoming_out"], "front", shapes={"stop": 0.4}, variant="in_curve")
-    (other,) = assumptions._in_other_forms(stop)
+    (other,) = contact_promise._in_other_forms(stop)
     assert other == replace(stop, variant="")
     uneven = Addition(EFFECTS["viscous_damping"], "front", shapes={"rebound": 0.4}, variant="uneven")
-    assert not [*assumptions._in_other_forms(uneven)], "its constant is none of the other forms'"
+    assert not [*contact_promise._in_other_forms(uneven)], "its constant is none of the other forms'"

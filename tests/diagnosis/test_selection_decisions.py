@@ -8,7 +8,7 @@ from helpers_made_up_steps import model, step
 
 from crash_estimator.core.diagnosis.online import candidate_turns
 from crash_estimator.core.diagnosis.report import diagnosis as report
-from crash_estimator.core.diagnosis.selection import assumptions, fitted_model, pair_search
+from crash_estimator.core.diagnosis.selection import assumptions, fitted_model, pair_search, selection_path
 from crash_estimator.core.diagnosis.selection.fitted_model import forces_jump
 
 
@@ -23,15 +23,15 @@ from crash_estimator.core.diagnosis.selection.fitted_model import forces_jump
 )
 def test_how_many_additions_are_believed_together(left, believed):
     models = [model(mean_square, k) for k, mean_square in enumerate(left)]
-    path = assumptions.SelectionPath(None, [step(m) for m in models[:-1]], models[-1], models[-1].fit, (), 36)
-    found = assumptions.first_believed(path)
+    path = selection_path.SelectionPath(None, [step(m) for m in models[:-1]], models[-1], models[-1].fit, (), 36)
+    found = selection_path.first_believed(path)
     assert len(found.final.additions) == found.as_recorded.additions == believed
     assert len(found.steps) == min(believed + 1, len(models) - 1)
 
 
 @pytest.mark.parametrize(("left", "over"), [(1.0, False), (1.5, True)])
 def test_what_leaves_noise_or_has_no_time_is_not_searched_in_a_smaller_band(monkeypatch, left, over):
-    path = assumptions.SelectionPath(None, [], model(left), None, (), 36)
+    path = selection_path.SelectionPath(None, [], model(left), None, (), 36)
     monkeypatch.setattr(assumptions, "_selected", lambda *given: path)
     monkeypatch.setattr(assumptions, "search_is_over", lambda: over)
     assert assumptions.select(None, (), {}) is path  # the band would be asked of its fit, which is none
@@ -155,7 +155,7 @@ def test_a_time_zero_counts_as_what_was_added_where_no_effect_was(monkeypatch, e
     models = [model(9.0, k) for k in range(effects + 1)]
     for one in models:
         one.fit.problem.noise_is_inflated = False
-    path = assumptions.SelectionPath(
+    path = selection_path.SelectionPath(
         None, [step(m) for m in models[:-1]] or [step(models[0])], models[-1], None, (), 36
     )
     left, sure = SimpleNamespace(share_explained=lambda before: 0.5), SimpleNamespace(coefficient=2.0, std=1.0)

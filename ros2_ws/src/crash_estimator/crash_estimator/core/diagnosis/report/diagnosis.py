@@ -17,10 +17,10 @@ from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import analyse, free_run, noise_floor
 from ..residuals.score_test import Drift, drift_of
 from ..selection.acceptance import needed_share, settled
-from ..selection.assumptions import SelectionPath, up_to
 from ..selection.fitted_model import Model
 from ..selection.onset_search import select_from_the_onset
 from ..selection.search_limit import limit_text, search_is_over, search_limit
+from ..selection.selection_path import SelectionPath, up_to
 from ..selection.selection_step import band_of_steps, fit_of_all, sized_models
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_zero import TimeZero

@@ -4,67 +4,32 @@ A model file says neither how sharply a structure folds, nor, unless it is asked
 that carries compression only may pull, and what still acts where that spring is spent.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
-from itertools import chain, islice
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from ...effects.effect import Addition, Effect
 from ...structure import Structure
 from ..observation.record import ObservedRecord
-from ..output_error.continuation import SLOW_CONTACT
-from ..output_error.gauss_newton import Fit, fit
 from ..output_error.problem import make_problem
 from ..parameterization.magnitudes import CELLS, Magnitudes, measure_magnitudes
 from ..parameterization.model_terms import additions_of
 from ..residuals.residuals import Residuals, analyse
 from ..residuals.score_test import drift_of
 from ..residuals.vibration import vibrates_from
-from .acceptance import cost_of_noise, share_removed
-from .contacts import all_when_spent, elastic_when_spent, moves_otherwise, never_pulling
-from .fitted_model import Model, fit_given, fit_model, forces_jump
+from .contact_promise import promised_by
+from .contacts import all_when_spent, elastic_when_spent, never_pulling
+from .fitted_model import Model, fit_given, fit_model
 from .forward_selection import first_step, forward_selection
 from .pruning import up_to_the_least_error
 from .rare_effects import found_as_common
 from .search_limit import search_is_over
-from .selection_step import SelectionStep, sized_models
+from .selection_path import SelectionPath, in_the_sensors_noise
+from .selection_step import sized_models
 from .thresholds import THRESHOLDS
 
 FINER_CELLS = 2 * CELLS
 """Cells of half the width, where what is left may be folds that those are too wide for."""
-
-
-class SelectionPath(NamedTuple):
-    """What a selection has found."""
-
-    structure: Structure  # as it was assumed
-    steps: list[SelectionStep]
-    final: Model
-    as_recorded: Fit  # of the final model, in the sensors' noise
-    records: Sequence[ObservedRecord]  # in the band that was compared
-    cells: int  # of the final model's curves
-    whole: bool = True  # False: it ends before its first addition, as other assumptions promise more
-
-    @property
-    def noise(self) -> bool:
-        """The final model leaves nothing else, and nothing that varies with time."""
-        return self.final.white and drift_of(self.as_recorded).constant
-
-    @property
-    def added(self) -> Sequence[Addition]:
-        return self.final.found
-
-    @property
-    def furthest(self) -> Fit:
-        """In the sensors' noise: of the final model, or of the best first candidate where none was added yet."""
-        best = None if self.whole else self.steps[0].best
-        return best.fit if best else self.as_recorded
-
-    def rank(self) -> tuple[bool, bool, float]:
-        """Of paths under different assumptions the largest is believed."""
-        return self.final.white, self.whole, self.furthest.evidence
 
 
 def select(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
@@ -109,7 +74,7 @@ def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: 
         nonlocal asked, answers
         others = {one: other for one in untried if (other := one(path.structure)) not in tried}
         if path is not asked:
-            asked, answers = path, {one: _promised(other, path, path.records) for one, other in others.items()}
+            asked, answers = path, {one: promised_by(other, path, path.records) for one, other in others.items()}
         return {one: answers[one] for one in others if answers[one] > -np.inf}
 
     tried = [structure]
@@ -122,90 +87,6 @@ def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: 
         tried.append(otherwise.structure)
         path = max(path, otherwise, key=SelectionPath.rank)
     return path
-
-
-def first_believed(path: SelectionPath) -> SelectionPath:
-    """Up to as many additions as are believed together, where all of them leave more than noise, or where these leave
-    next to nothing: the first ones explain most, and what came after them only goes on from there."""
-    most = THRESHOLDS.most_at_once
-    if len(path.added) <= most:
-        return path
-    final = path.steps[most].before
-    if path.final.white and share_removed(path.steps[0].before.residuals, final.residuals) < THRESHOLDS.all_but_folds:
-        return path
-    return up_to(path, most)
-
-
-def up_to(path: SelectionPath, count: int) -> SelectionPath:
-    """With the first of its additions only."""
-    steps = path.steps[: count + 1]
-    final = steps[-1].before
-    as_recorded = in_the_sensors_noise(steps[-1].sized, path.records)
-    return path._replace(steps=steps, final=final, as_recorded=as_recorded)
-
-
-def _promised(other: Structure, path: SelectionPath, records: Sequence[ObservedRecord]) -> float:
-    """Nats: the evidence of what was found, under contacts as they are assumed otherwise; -inf where nothing is
-    missing, where they would explain none of it, or less than what leaves noise already.
-
-    Taken the wrong way, a damper that pulls looks like another effect.
-    """
-    final = path.final
-    if other == path.structure or (not path.added and final.white):
-        return -np.inf
-    magnitudes = measure_magnitudes(other, records, path.cells)
-    models = [step.before for step in path.steps]
-    models = models if models[-1] is final else [*models, final]
-    found = ((model.additions, in_the_sensors_noise(model, records)) for model in models)
-    felt = ((additions, one) for additions, one in found if moves_otherwise(one, other))
-    likely = ((additions, one) for additions, one in _likely(path) if moves_otherwise(one, other))
-    first = max((one.fit.evidence for one in path.steps[0].as_recorded[:1] if one.fit), default=-np.inf)
-    most, seen = -np.inf, set()
-    for additions, as_recorded in chain(felt, islice(likely, THRESHOLDS.few)):
-        what = frozenset((one.key, one.variant) for one in additions)
-        if what in seen:
-            continue
-        seen.add(what)
-        otherwise = _fitted_slowly(magnitudes, records, additions)
-        misfit = 0.5 * max(as_recorded.cost - cost_of_noise(records), 0.0)  # nats
-        # what stays behind the best of all must gain most of what it lacked
-        share = THRESHOLDS.least_share if otherwise.evidence > first else THRESHOLDS.leading_share
-        if otherwise.evidence > as_recorded.evidence + THRESHOLDS.gain + share * misfit:
-            most = max(most, otherwise.evidence)
-    if final.white and len(path.added) <= THRESHOLDS.most_at_once:
-        return most if most > path.as_recorded.evidence else -np.inf
-    return most if most > first or not path.whole else -np.inf
-
-
-def _fitted_slowly(magnitudes: Magnitudes, records: Sequence[ObservedRecord], additions: Sequence[Addition]) -> Fit:
-    """With care for forces that jump at a contact."""
-    problem = make_problem(magnitudes, records, additions)
-    found = fit(problem)
-    if not forces_jump(problem.layout):
-        return found
-    return max(found, fit(problem, found.point, SLOW_CONTACT), key=lambda one: one.evidence)
-
-
-def _likely(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]]:
-    """The best first candidates, as another than the right one may have come first, in all their forms; where one
-    leaves noise, those that explain nearly as much."""
-    first = path.steps[0]
-    magnitudes = measure_magnitudes(path.structure, path.records, path.cells)
-    fitted = [one for one in first.as_recorded if one.fit]
-    if path.final.white:
-        fitted = [one for one in fitted if one.gain > (1.0 - THRESHOLDS.least_share) * fitted[0].gain]
-    for one in fitted:  # from where it began: what it has come to may be what made up for the contact
-        yield (*first.before.additions, one.addition), one.fit
-        for other in _in_other_forms(one.addition):
-            additions = (*first.before.additions, other)
-            yield additions, fit(make_problem(magnitudes, path.records, additions))
-
-
-def _in_other_forms(addition: Addition) -> Iterator[Addition]:
-    """With the same constants: the form that leaves least under some contacts may be another one than under others."""
-    effect = addition.effect
-    alike = (v for v in effect.variants if v != addition.variant and [*effect.shapes_of(v)] == [*addition.shapes])
-    yield from (replace(addition, variant=variant) for variant in alike)
 
 
 def _as_exact_as_needed(
@@ -303,9 +184,3 @@ def _wants_finer_curves(final: Model, mimicked: bool, residuals: Residuals, fine
     if final.white or residuals.mean_square >= THRESHOLDS.near_floor:
         return False
     return refined(final.additions).white
-
-
-def in_the_sensors_noise(model: Model, records: Sequence[ObservedRecord]) -> Fit:
-    """The model's fit; made again where that was in a larger noise."""
-    problem = model.fit.problem
-    return fit(problem.on(records), model.fit.point) if problem.noise_is_inflated else model.fit

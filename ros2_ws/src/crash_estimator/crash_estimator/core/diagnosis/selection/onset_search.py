@@ -18,10 +18,11 @@ from ..observation.rest import rests_of
 from ..parameterization.layout import FARTHEST
 from ..residuals.residuals import Residuals, analyse
 from .acceptance import share_removed
-from .assumptions import SelectionPath, as_given, first_believed, select
+from .assumptions import as_given, select
 from .fitted_model import Model
 from .forward_selection import first_step
 from .search_limit import half_of_what_is_left, search_is_over
+from .selection_path import SelectionPath, first_believed
 from .thresholds import THRESHOLDS
 from .time_zero import Shift, TimeZero, coasting, moved_by, onsets, touching
 
