@@ -2,7 +2,8 @@
 
 Parameters stand in this order: forces at the curves' knots, then constants of elements and effects and errors of the
 masses, then for each recording the nuisances (errors and drifts of its outputs' zeros, slow errors of its driven
-motions, errors of the velocities that it starts with, errors of the zeros of forces that are applied).
+motions, errors of the velocities that it starts with, errors of the zeros of forces that are applied, how late bodies
+touch).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -65,7 +66,7 @@ class Layout(NamedTuple):
     modes: tuple[dict[int, range], ...]  # per record: driven body -> its modes, the mean first
     kicks: tuple[dict[int, int], ...]  # per record: body that starts as its own channel says -> error of its velocity
     zeros: tuple[dict[int, int], ...]  # per record: body that a measured force is applied to -> error of its zero, N
-    late: tuple[int, ...]  # per record: s by which bodies that coast touch late; -1: when they touch is known
+    late: tuple[int, ...]  # per record: how late bodies touch that coast until then, s; -1: when they touch is known
     weighed: dict[int, int]  # in doubt: free body -> relative error of its mass
     prior: Prior
     start: np.ndarray  # (p,)

@@ -26,6 +26,10 @@ from .selection_path import SelectionPath, first_believed
 from .thresholds import THRESHOLDS
 from .time_zero import Shift, TimeZero, coasting, moved_by, onsets, touching
 
+HALF_AS_FAR = 0.5 * AS_WELL**0.5
+"""Standard deviations of an onset off the stated time zero, without a word of it, from which on the bodies may touch
+elsewhere: of looked-at ones that are told so the nearest was 1.6."""
+
 
 class Begun(NamedTuple):
     """What a selection has found, and from which time zeros."""
@@ -124,7 +128,7 @@ class _Search:
     def _may_begin_elsewhere(self, path: SelectionPath, elsewhere: Sequence[Shift]) -> bool:
         """Where something is left, or several effects may make up for it, as channels that are all late do for a time
         zero that is early, however gently the motion rises out of the noise."""
-        if not any(max(abs(shift.seconds), shift.early) > shift.period for shift in self.begins):
+        if not (elsewhere or any(abs(shift.off(0.0)) > HALF_AS_FAR * shift.impact[1] for shift in self.begins)):
             return False
         if not elsewhere and _left_by(path).mean_square >= THRESHOLDS.real_structure:
             return False
