@@ -67,13 +67,12 @@ class _Search:
             if not given.white and len(self.in_doubt.added) <= 1 and _leaves_about_noise(self.in_doubt):
                 if zero or not first_step(magnitudes, self.effects, given).leaves_noise:
                     touched = self._from_the_touch(given)
-            if touched and touched.path.noise:
+            if touched and (touched.path.noise or search_is_over()):
                 return touched
         found = self._stated_or_early(zero, elsewhere)
-        if search_is_over() or not self._may_begin_elsewhere(found.path, elsewhere):
-            return found
-        if not touched and _better(self.in_doubt, found.path):
-            touched = self._from_the_touch(zero.as_stated if zero else found.path.steps[0].before)
+        if not (touched or search_is_over()) and self._may_begin_elsewhere(found.path, elsewhere):
+            if _better(self.in_doubt, found.path):
+                touched = self._from_the_touch(zero.as_stated if zero else found.path.steps[0].before)
         return touched if touched and _better(touched.path, found.path) else found
 
     def _stated_or_early(self, zero: TimeZero | None, elsewhere: tuple[Shift, ...]) -> Begun:
