@@ -127,7 +127,8 @@ class _Search:
     def _may_begin_elsewhere(self, path: SelectionPath, elsewhere: Sequence[Shift]) -> bool:
         """Where something is left, or several effects may make up for it, as channels that are all late do for a time
         zero that is early, however gently the motion rises out of the noise."""
-        if not (elsewhere or any(abs(shift.off(0.0)) > HALF_AS_FAR * shift.impact[1] for shift in self.begins)):
+        hidden = (one.early or abs(one.seconds) > HALF_AS_FAR * one.impact[1] for one in self.begins)
+        if not (elsewhere or any(hidden)):
             return False
         if not elsewhere and _left_by(path).mean_square >= THRESHOLDS.real_structure:
             return False
