@@ -1,6 +1,7 @@
 """What the selection does with what its fits have found: the fits are made up, what follows from them is judged."""
 
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -35,6 +36,41 @@ def test_what_leaves_noise_or_has_no_time_is_not_searched_in_a_smaller_band(monk
     monkeypatch.setattr(assumptions, "_selected", lambda *given: path)
     monkeypatch.setattr(assumptions, "search_is_over", lambda: over)
     assert assumptions.select(None, (), {}) is path  # the band would be asked of its fit, which is none
+
+
+class Band(NamedTuple):
+    """A record of which all is compared, or what is below so many Hz."""
+
+    below: float = np.inf
+
+    def in_band(self, below):
+        return Band(below)
+
+
+@pytest.mark.parametrize(
+    ("mean_square", "rings", "gone_on"), [(1.5, True, True), (2.5, True, False), (1.5, False, False)]
+)
+def test_what_rings_is_gone_on_with_below_the_band_as_soon_as_the_best_first_candidate_leaves_nothing_else(
+    monkeypatch, mean_square, rings, gone_on
+):
+    """Under the contacts that were found; not where more than about the noise is left."""
+    asked = []
+    best = SimpleNamespace(fit=SimpleNamespace(mean_square=mean_square, evidence=0.0), addition="friction")
+    given = SimpleNamespace(white=False, found=())
+    first = selection_path.SelectionPath("found", [SimpleNamespace(best=best)], given, None, (Band(),), 36, whole=False)
+
+    def selected(structure, records, effects):
+        asked.append((structure, records[0].below, effects))
+        return first if len(asked) == 1 else first._replace(records=tuple(records), whole=True)
+
+    monkeypatch.setattr(assumptions, "_selected", selected)
+    monkeypatch.setattr(assumptions, "analyse", lambda fitted: fitted)
+    monkeypatch.setattr(assumptions, "vibrates_from", lambda left, records: 240.0 if rings else np.inf)
+    monkeypatch.setattr(assumptions, "found_as_common", lambda effects, added: {"looked for first": added})
+    found = assumptions.select("stated", (Band(),), {})
+    assert assumptions._rings(first) == gone_on and found.whole == gone_on
+    assert asked[1:] == ([("found", 240.0, {"looked for first": ["friction"]})] if gone_on else [])
+    assert not assumptions._rings(first._replace(records=(Band(240.0),))), "below the band nothing more rings"
 
 
 @pytest.mark.parametrize(("wanted", "over", "searches"), [(True, False, 2), (False, False, 1), (True, True, 1)])

@@ -67,6 +67,11 @@ LITTLE, DROWNED = left(0.009, 1.0), left(0.009, 0.13)
         ({"ranking": (LEADER, ranked("viscous_damping", "car_barrier", 49.0))}, DEFAULT, "effect_missing", False),
         ({"white": True, "by_first": 0.96}, DEFAULT, "effect_missing", False),  # of little weight beside that
         ({"after": left(0.05, 6.0)}, DEFAULT, "unexplained", False),  # it explains two thirds
+        ({"drift": VARIES, "after": left(0.009, 0.9)}, DEFAULT, "effect_missing", True),  # it explains 0.992
+        ({"drift": VARIES, "after": left(0.009, 1.5)}, DEFAULT, "unexplained", False),  # it explains 0.978
+        ({"drift": VARIES, "after": left(0.02, 0.9)}, DEFAULT, "unexplained", False),  # of more than the tolerance
+        ({"drift": VARIES, "after": left(0.02, 0.13)}, DEFAULT, "effect_missing", False),  # but less than the noise
+        ({"drift": VARIES, "after": left(0.009, 0.9), "added": 2}, DEFAULT, "unexplained", False),
         ({"added": 0, "before": LITTLE, "after": LITTLE}, DEFAULT, "adequate", True),
         ({"before": LITTLE, "after": LITTLE}, DEFAULT, "unexplained", False),  # something was added, to no avail
         ({"before": DROWNED, "after": DROWNED}, DEFAULT, "adequate", True),
@@ -265,3 +270,21 @@ def test_a_time_limit_is_above_zero(monkeypatch, capsys):
         with pytest.raises(SystemExit) as ended:
             command.main()
         assert ended.value.code == 2 and "seconds above 0" in capsys.readouterr().err
+
+
+def test_a_search_within_another_has_half_of_what_that_has_left(monkeypatch):
+    made = [100]
+    monkeypatch.setattr(search_limit, "iterations_made", lambda: made[0])
+    monkeypatch.setattr(search_limit, "LONGEST_SEARCH", 1000)
+    with search_limit.search_limit(None):
+        made[0] = 500  # 600 are left
+        with search_limit.half_of_what_is_left():
+            made[0] = 800
+            assert not search_limit.search_is_over()
+            made[0] = 801
+            assert search_limit.search_is_over()
+        assert not search_limit.search_is_over()
+        made[0] = 1101
+        assert search_limit.search_is_over()
+    with search_limit.search_limit(np.inf), search_limit.half_of_what_is_left():
+        assert not search_limit.search_is_over()
