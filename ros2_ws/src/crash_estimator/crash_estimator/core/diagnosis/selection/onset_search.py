@@ -28,8 +28,7 @@ from .time_zero import Shift, TimeZero, coasting, moved_by, onsets, touching
 
 HALF_AS_FAR = 0.5 * AS_WELL**0.5
 """Standard deviations of an onset off the stated time zero, though by less than is told, from which on bodies may touch
-elsewhere. In the two looked-at tests that it was made for the farther onset is 2.8 and 2.9 of them off; of 60 outside
-the vocabulary, most of which are not asked so, half took 2.7 s instead of the 4.3 s of a busy machine."""
+elsewhere. In the two looked-at tests that it was made for the farther onset is 2.8 and 2.9 of them off."""
 
 
 class Begun(NamedTuple):
