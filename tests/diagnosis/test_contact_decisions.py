@@ -54,6 +54,7 @@ def with_contacts(monkeypatch, promised, noise_under="none", ends_early=False) -
     monkeypatch.setattr(assumptions, "promised_by", lambda other, *given: promised.get(other, -np.inf))
     monkeypatch.setattr(assumptions, "search_is_over", lambda: False)
     monkeypatch.setattr(assumptions, "_as_exact_as_needed", search)
+    monkeypatch.setattr(assumptions, "likely_first", lambda path: iter(()))
     monkeypatch.setattr(assumptions, "_rings", lambda begun: False)
     return searched
 
@@ -71,11 +72,11 @@ def test_other_contacts_must_explain_a_share_of_what_is_above_the_noise(monkeypa
     best = SimpleNamespace(fit=SimpleNamespace(evidence=best_first))
     path = SimpleNamespace(
         structure="as stated", added=(one,), final=final, cells=36, as_recorded=final.fit, whole=True,
-        steps=[SimpleNamespace(before=final, as_recorded=[best])],
+        steps=[SimpleNamespace(before=final, as_recorded=[best])], furthest=final.fit, records=[record],
     )  # fmt: skip
     with_fits(monkeypatch, gain * THRESHOLDS.gain)
     monkeypatch.setattr(contact_promise, "moves_otherwise", lambda *given: True)
-    assert np.isfinite(contact_promise.promised_by("other", path, [record])) == promises
+    assert np.isfinite(contact_promise.promised_by("other", path, ())) == promises
 
 
 @pytest.mark.parametrize(("gains", "promises"), [(0.4, False), (0.6, True), (1.1, True)])
@@ -86,23 +87,22 @@ def test_candidates_that_contacts_concern_are_asked_behind_those_that_they_do_no
     evidence = {"speed": 0.0, "mass": -10.0, "force": -20.0, "damper": -1000.0}
     fits = {key: SimpleNamespace(evidence=e, cost=3000.0, name=key) for key, e in evidence.items()}
     first = [SimpleNamespace(fit=fitted) for fitted in fits.values()]
+    record = SimpleNamespace(bins=500, measured=np.zeros((1, 2)))
     path = SimpleNamespace(
         structure="as stated", added=(), final=given, cells=36, as_recorded=given.fit, whole=False,
-        steps=[SimpleNamespace(before=given, as_recorded=first)],
+        steps=[SimpleNamespace(before=given, as_recorded=first)], furthest=fits["speed"], records=[record],
     )  # fmt: skip
-    record = SimpleNamespace(bins=500, measured=np.zeros((1, 2)))
     likely = [([SimpleNamespace(key=(key, "car"), variant="")], fitted) for key, fitted in fits.items()]
-    with_fits(monkeypatch, -1000.0 + 1000.0 * gains, likely)
+    with_fits(monkeypatch, -1000.0 + 1000.0 * gains)
     monkeypatch.setattr(contact_promise, "moves_otherwise", lambda one, other: getattr(one, "name", "") == "damper")
-    assert np.isfinite(contact_promise.promised_by("other", path, [record])) == promises
+    assert np.isfinite(contact_promise.promised_by("other", path, likely)) == promises
 
 
-def with_fits(monkeypatch, evidence, likely=()):
+def with_fits(monkeypatch, evidence):
     """All models are fitted with as much evidence under other contacts."""
     otherwise = SimpleNamespace(evidence=evidence)
     monkeypatch.setattr(contact_promise, "measure_magnitudes", lambda *given: None)
     monkeypatch.setattr(contact_promise, "in_the_sensors_noise", lambda model, records: model.fit)
-    monkeypatch.setattr(contact_promise, "_likely", lambda path: likely)
     monkeypatch.setattr(contact_promise, "_fitted_slowly", lambda *given: otherwise)
 
 

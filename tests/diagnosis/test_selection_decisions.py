@@ -107,7 +107,7 @@ def test_a_fit_in_doubt_goes_on_from_the_one_that_was_not_where_the_curves_are_t
     before.fit.layout, before.fit.theta, before.fit.trajectories = layout(knots), None, None
     starts = []
     monkeypatch.setattr(assumptions, "make_problem", lambda *given: problem)
-    monkeypatch.setattr(assumptions, "fit_model", lambda magnitudes, records, additions, start: starts.append(start))
+    monkeypatch.setattr(assumptions, "fit_model", lambda *given: starts.append(given[3]))
     assumptions._in_doubt(SimpleNamespace(records=()), before)
     assert starts == ["there" if goes_on else None]
 

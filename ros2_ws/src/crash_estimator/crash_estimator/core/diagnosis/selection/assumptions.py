@@ -5,6 +5,7 @@ that carries compression only may pull, and what still acts where that spring is
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import tee
 
 import numpy as np
 
@@ -17,7 +18,8 @@ from ..parameterization.model_terms import additions_of
 from ..residuals.residuals import Residuals, analyse
 from ..residuals.score_test import drift_of
 from ..residuals.vibration import vibrates_from
-from .contact_promise import promised_by
+from .acceptance import cost_of_noise
+from .contact_promise import likely_first, promised_by
 from .contacts import all_when_spent, elastic_when_spent, never_pulling
 from .fitted_model import Model, fit_given, fit_model
 from .forward_selection import first_step, forward_selection
@@ -74,7 +76,9 @@ def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: 
         nonlocal asked, answers
         others = {one: other for one in untried if (other := one(path.structure)) not in tried}
         if path is not asked:
-            asked, answers = path, {one: promised_by(other, path, path.records) for one, other in others.items()}
+            likely = tee(likely_first(path), len(others))  # what one has fitted of it, the next ones need not
+            pairs = zip(others.items(), likely, strict=True)
+            asked, answers = path, {one: promised_by(other, path, again) for (one, other), again in pairs}
         return {one: answers[one] for one in others if answers[one] > -np.inf}
 
     tried = [structure]
@@ -102,12 +106,13 @@ def _as_exact_as_needed(
     if records[0].in_doubt:
         return _with_curves_as_fine_as_needed(magnitudes, given, effects, elsewhere)
     doubted = magnitudes._replace(records=[record._replace(in_doubt=True) for record in records])
-    start, path = _in_doubt(doubted, given), None
+    most = THRESHOLDS.near_floor * cost_of_noise(records)  # what leaves more is no noise
+    start, path = _in_doubt(doubted, given, most), None
     if not _leaves_noise(start):
         path = _with_curves_as_fine_as_needed(magnitudes, given, effects, elsewhere)
         models = [step.before for step in path.steps if step.before is not given]
         models += [] if path.steps[-1].before is path.final else [path.final]
-        fewer = (_in_doubt(doubted, model) for model in models if not (model is path.final and path.noise))
+        fewer = (_in_doubt(doubted, model, most) for model in models if not (model is path.final and path.noise))
         if search_is_over() or not any(map(_leaves_noise, fewer)):
             return path
         start = _in_doubt(doubted, path.steps[0].before)  # a candidate's fit may have shown a better one
@@ -124,15 +129,15 @@ def as_given(
     return magnitudes, fit_given(magnitudes, records, additions_of(magnitudes, effects))
 
 
-def _in_doubt(doubted: Magnitudes, model: Model) -> Model:
-    """The model where masses and zeros may err."""
+def _in_doubt(doubted: Magnitudes, model: Model, hopeless: float = np.inf) -> Model:
+    """The model where masses and zeros may err; hopeless: as of `fit_model`."""
     problem, start = make_problem(doubted, doubted.records, model.additions), None
     if [link.curve and len(link.curve.knots) for link in problem.layout.links] == [
         link.curve and len(link.curve.knots) for link in model.fit.layout.links
     ]:  # else its curves are finer, or reach elsewhere
         theta = problem.widened(model.fit.layout, model.fit.theta)
         start = problem.moved(theta, model.fit.trajectories)
-    return fit_model(doubted, doubted.records, model.additions, start)
+    return fit_model(doubted, doubted.records, model.additions, start, hopeless)
 
 
 def _leaves_noise(model: Model) -> bool:

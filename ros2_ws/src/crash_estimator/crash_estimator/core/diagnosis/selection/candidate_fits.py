@@ -186,11 +186,11 @@ class _Search:
 
     def rival_with_care(self) -> None:
         """Fit another law on the same target that comes near the best one as carefully as that may need: what looks
-        like the second is else not told from it."""
+        like the second is else not told from it. Not one so far behind that no candidate is fitted to the end there."""
         best, *others = [one for one in self.ranking() if one.fit]
         near = (one for one in others if one.addition.target == best.addition.target)
         rival = next(near, None)
-        if rival and rival.gain > THRESHOLDS.named_share * best.gain:
+        if rival and rival.fit.cost < best.fit.cost + THRESHOLDS.hopeless:
             self.from_motion((one for one in self.screened if one.addition.key == rival.addition.key), SMALL_STEPS)
             rival = self.found[rival.addition.key]
             on = fit(rival.fit.problem, rival.fit.point, SLOW_CONTACT, most=2 * MOST_ITERATIONS)

@@ -1,7 +1,7 @@
 """What contacts as they may be assumed otherwise promise of a selection: which of the models that it has fitted would
 explain more under them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain, islice
 
@@ -21,13 +21,13 @@ from .selection_path import SelectionPath, in_the_sensors_noise
 from .thresholds import THRESHOLDS
 
 
-def promised_by(other: Structure, path: SelectionPath, records: Sequence[ObservedRecord]) -> float:
+def promised_by(other: Structure, path: SelectionPath, likely: Iterable[tuple[Sequence[Addition], Fit]]) -> float:
     """Nats: the evidence of what was found, under contacts as they are assumed otherwise; -inf where nothing is
     missing, where they would explain none of it, or less than what leaves noise already.
 
-    Taken the wrong way, a damper that pulls looks like another effect.
+    Taken the wrong way, a damper that pulls looks like another effect. likely: the path's `likely_first`.
     """
-    final = path.final
+    final, records = path.final, path.records
     if other == path.structure or (not path.added and final.white):
         return -np.inf
     magnitudes = measure_magnitudes(other, records, path.cells)
@@ -35,7 +35,7 @@ def promised_by(other: Structure, path: SelectionPath, records: Sequence[Observe
     models = models if models[-1] is final else [*models, final]
     found = ((model.additions, in_the_sensors_noise(model, records)) for model in models)
     felt = ((additions, one) for additions, one in found if moves_otherwise(one, other))
-    likely = ((additions, one) for additions, one in _likely(path) if moves_otherwise(one, other))
+    likely = ((additions, one) for additions, one in likely if moves_otherwise(one, other))
     first = max((one.fit.evidence for one in path.steps[0].as_recorded[:1] if one.fit), default=-np.inf)
     most, seen = -np.inf, set()
     for additions, as_recorded in chain(felt, islice(likely, THRESHOLDS.few)):
@@ -43,7 +43,7 @@ def promised_by(other: Structure, path: SelectionPath, records: Sequence[Observe
         if what in seen:
             continue
         seen.add(what)
-        otherwise = _fitted_slowly(magnitudes, records, additions)
+        otherwise = _fitted_slowly(magnitudes, records, additions, path.furthest.cost + THRESHOLDS.hopeless)
         misfit = 0.5 * max(as_recorded.cost - cost_of_noise(records), 0.0)  # nats
         # what stays behind the best of all must gain most of what it lacked
         share = THRESHOLDS.least_share if otherwise.evidence > first else THRESHOLDS.leading_share
@@ -54,16 +54,18 @@ def promised_by(other: Structure, path: SelectionPath, records: Sequence[Observe
     return most if most > first or not path.whole else -np.inf
 
 
-def _fitted_slowly(magnitudes: Magnitudes, records: Sequence[ObservedRecord], additions: Sequence[Addition]) -> Fit:
-    """With care for forces that jump at a contact."""
+def _fitted_slowly(
+    magnitudes: Magnitudes, records: Sequence[ObservedRecord], additions: Sequence[Addition], hopeless: float
+) -> Fit:
+    """With care for forces that jump at a contact; hopeless: as of `fit`."""
     problem = make_problem(magnitudes, records, additions)
-    found = fit(problem)
+    found = fit(problem, hopeless=hopeless)
     if not forces_jump(problem.layout):
         return found
-    return max(found, fit(problem, found.point, SLOW_CONTACT), key=lambda one: one.evidence)
+    return max(found, fit(problem, found.point, SLOW_CONTACT, hopeless), key=lambda one: one.evidence)
 
 
-def _likely(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]]:
+def likely_first(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]]:
     """The best first candidates, as another than the right one may have come first, in all their forms; where one
     leaves noise, those that explain nearly as much."""
     first = path.steps[0]

@@ -1,7 +1,6 @@
 """A structure with some additions, fitted to recordings."""
 
 from collections.abc import Mapping, Sequence
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -62,17 +61,26 @@ class Model(NamedTuple):
     def best_of(self, schedules: Sequence[Schedule], *others: "Model") -> "Model":
         """The best of this fit, others of the same model, and those from the measured motion by other schedules."""
         best = self
-        for other in chain(others, (self.refitted(schedule=schedule) for schedule in schedules)):
+        for other in others:
+            best = other if better(other, best) else best
+        for schedule in schedules:
+            other = self.refitted(schedule=schedule, hopeless=best.fit.cost)
             best = other if better(other, best) else best
         return best
 
 
 def fit_model(
-    magnitudes: Magnitudes, records: Sequence[ObservedRecord], additions: Sequence[Addition], start: Point | None = None
-) -> Model:
-    """Fit, then let the curves fold where they were found to bend sharply, and fit again."""
+    magnitudes: Magnitudes, records: Sequence[ObservedRecord], additions: Sequence[Addition],
+    start: Point | None = None, hopeless: float = np.inf,
+) -> Model:  # fmt: skip
+    """Fit, then let the curves fold where they were found to bend sharply, and fit again.
+
+    hopeless: cost of which it is enough to know that the model leaves that.
+    """
     problem = make_problem(magnitudes, records, additions)
-    found = fit(problem, start)
+    found = fit(problem, start, hopeless=hopeless)
+    if hopeless < found.cost < np.inf:
+        return Model(tuple(additions), found, analyse(found, sharply=True), {})
     if not found.cost < cost_of_nothing(records):
         found = fit(problem, schedule=SMALL_STEPS)
     curves = [link for link in problem.layout.links if link.curve is not None]
@@ -94,8 +102,8 @@ def fit_given(magnitudes: Magnitudes, records: Sequence[ObservedRecord], additio
     model = fit_model(magnitudes, records, additions)
     if model.white:
         return model
-    as_stated = fit(model.fit.problem.starting_as_stated())
-    return model.best_of((SMALL_STEPS, LARGE_NOISE), model.refitted(as_stated.point))
+    as_stated = fit(model.fit.problem.starting_as_stated(), hopeless=model.fit.cost)
+    return model.best_of((SMALL_STEPS, LARGE_NOISE), model.refitted(as_stated.point, hopeless=model.fit.cost))
 
 
 def _with_more_care(problem: OutputErrorProblem, found: Fit, residuals: Residuals) -> tuple[Fit, Residuals]:

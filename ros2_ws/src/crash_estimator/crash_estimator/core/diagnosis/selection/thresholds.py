@@ -117,8 +117,9 @@ class Thresholds(NamedTuple):
     looked-at steps in which it changed by less the third time, one was led by another candidate then, of two within
     half a nat."""
     hopeless: float = 400.0
-    """Cost: a candidate that stays this far above the best one's is not fitted to the end; where the model leaves only
-    noise, nor is one that does not come below the model's own."""
+    """Cost: a candidate that stays this far above the best one's is not fitted to the end, under any contacts, nor with
+    care as its rival; where the model leaves only noise, nor is one that does not come below the model's own. Of 150
+    looked-at cases of the second simulator 146 are right so, 145 where contacts and rivals were fitted to the end."""
 
 
 THRESHOLDS = Thresholds()

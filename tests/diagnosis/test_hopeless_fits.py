@@ -1,0 +1,80 @@
+"""Fits that are given up once it is known that nothing comes of them, and what is fitted once only."""
+
+from itertools import tee
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from helpers_made_up_fits import candidate
+
+from crash_estimator.core.diagnosis import THRESHOLDS
+from crash_estimator.core.diagnosis.selection import assumptions, candidate_fits, contact_promise, fitted_model
+from crash_estimator.core.diagnosis.selection.fitted_model import Model
+
+
+@pytest.mark.parametrize(("behind", "asked"), [(0.9, True), (1.1, False)])
+def test_only_a_rival_that_is_near_is_fitted_with_care(monkeypatch, behind, asked):
+    fits = []
+    best, rival = candidate(900.0), candidate(800.0, ("hysteresis", "spring"))
+    best.fit.cost, rival.fit.cost = 1000.0, 1000.0 + behind * THRESHOLDS.hopeless
+    best.addition.target = rival.addition.target = "spring"
+    rival.fit.problem = None
+    monkeypatch.setattr(candidate_fits, "fit", lambda *given, **more: fits.append("slowly"))
+    search = candidate_fits._Search(None, SimpleNamespace(fit=SimpleNamespace(cost=5000.0)), [])
+    search.found = {one.addition.key: one for one in (best, rival)}
+    search.from_motion = lambda chosen, schedule: fits.append("anew")
+    search._note = lambda *given: None
+    search.rival_with_care()
+    assert fits == (["anew", "slowly"] if asked else [])
+
+
+@pytest.mark.parametrize(("cost", "refined"), [(1500.0, True), (2500.0, False)])
+def test_a_model_that_leaves_more_than_is_asked_for_is_not_refined(monkeypatch, cost, refined):
+    """Its curves are not let fold: that it leaves too much is known."""
+    made, given = [], []
+    problem = SimpleNamespace(layout=SimpleNamespace(links=[SimpleNamespace(curve="curve", name="spring")]))
+    problem.noise_is_inflated = True
+    found = SimpleNamespace(cost=cost, theta=None, point=None)
+    monkeypatch.setattr(fitted_model, "make_problem", lambda *given: made.append(len(given)) or problem)
+    monkeypatch.setattr(fitted_model, "fit", lambda *args, hopeless=np.inf: given.append(hopeless) or found)
+    monkeypatch.setattr(fitted_model, "cost_of_nothing", lambda records: 1e6)
+    monkeypatch.setattr(fitted_model, "mean_square_of_nothing", lambda records: 1e6)
+    monkeypatch.setattr(fitted_model, "adapted_roughness", lambda curve, theta: None)
+    monkeypatch.setattr(fitted_model, "analyse", lambda fit, sharply: SimpleNamespace(mean_square=2.0))
+    model = fitted_model.fit_model(None, (), (), hopeless=2000.0)
+    assert isinstance(model, Model) and model.fit is found
+    assert len(made) == (2 if refined else 1) and given[0] == 2000.0
+
+
+def test_whether_doubts_leave_noise_is_asked_no_further_than_twice_the_noise(monkeypatch):
+    """Of a model that leaves noise with them its fit is wanted, and made to the end."""
+    asked = []
+    given = SimpleNamespace(fit="given", additions=())
+    path = SimpleNamespace(steps=[SimpleNamespace(before=given)], final=given, noise=False)
+    records = [SimpleNamespace(in_doubt=False, _replace=lambda **more: None)]
+    magnitudes = SimpleNamespace(records=records, _replace=lambda records: None)
+    monkeypatch.setattr(assumptions, "as_given", lambda *args: (magnitudes, given))
+    monkeypatch.setattr(assumptions, "cost_of_noise", lambda records: 100.0)
+    monkeypatch.setattr(assumptions, "search_is_over", lambda: False)
+    monkeypatch.setattr(assumptions, "_with_curves_as_fine_as_needed", lambda *args: path)
+    monkeypatch.setattr(assumptions, "_leaves_noise", lambda model: False)
+    monkeypatch.setattr(assumptions, "_in_doubt", lambda doubted, model, hopeless=np.inf: asked.append(hopeless))
+    assert assumptions._as_exact_as_needed(None, records, {}) is path
+    assert set(asked) == {100.0 * THRESHOLDS.near_floor}
+
+
+def test_what_is_likely_is_fitted_once_whatever_contacts_are_asked_of_it(monkeypatch):
+    """The best first candidate's other form, under the contacts as they are, for three others that it feels."""
+    fits = []
+    form = SimpleNamespace(key=("stop", "spring"), variant="in_curve")
+    best = candidate(900.0, ("stop", "spring"))
+    best.addition.variant = ""
+    first = SimpleNamespace(as_recorded=[best], before=SimpleNamespace(additions=()))
+    path = SimpleNamespace(steps=[first], structure=None, records=(), cells=36, final=SimpleNamespace(white=False))
+    monkeypatch.setattr(contact_promise, "measure_magnitudes", lambda *given: None)
+    monkeypatch.setattr(contact_promise, "make_problem", lambda *given: None)
+    monkeypatch.setattr(contact_promise, "_in_other_forms", lambda addition: [form])
+    monkeypatch.setattr(contact_promise, "fit", lambda problem: fits.append(problem))
+    seen = [[variant for ((addition,), _) in again for variant in [addition.variant]]
+            for again in tee(contact_promise.likely_first(path), 3)]  # fmt: skip
+    assert seen == [["", "in_curve"]] * 3 and len(fits) == 1
