@@ -5,6 +5,7 @@ import re
 import shlex
 import shutil
 import subprocess
+import time
 
 import numpy as np
 import pytest
@@ -57,13 +58,31 @@ def test_a_command_runs_as_it_stands(command):
     assert "Traceback" not in done.stderr
 
 
-def test_the_nodes_find_each_other(tmp_path):
-    assert len(LISTENING) == 3 and len(REPLAY) == 1
-    written = [ROOT / "out" / "dummy.rrd", ROOT / "out" / "dummy_estimates.mcap"]
-    for file in written:
+@pytest.fixture
+def written():
+    """Files that the nodes write, which were not there before."""
+    files = [ROOT / "out" / "dummy.rrd", ROOT / "out" / "dummy_estimates.mcap"]
+    for file in files:
         file.unlink(missing_ok=True)
         file.parent.mkdir(exist_ok=True)
-    logs = [open(tmp_path / f"{k}.log", "w+") for k in range(3)]
+    return files
+
+
+def test_the_nodes_find_each_other(tmp_path, written):
+    """Told to end at once, a viewer has 9 s for what it was sent; where other work leaves it too little, it says so,
+    and a minute later it is done."""
+    assert len(LISTENING) == 3 and len(REPLAY) == 1
+    statuses, said = _replayed(tmp_path)
+    if any(statuses) and "incomplete: not finished within" in said:
+        statuses, said = _replayed(tmp_path, later=60.0)
+    assert "Traceback" not in said and "not seen" not in said, said
+    assert statuses == [0, 0, 0], said
+    assert all(file.stat().st_size > 100_000 for file in written)
+
+
+def _replayed(tmp_path, later: float = 0.0) -> tuple[list[int], str]:
+    """How the listening nodes ended, which are told to so many s after the replay, and what they said."""
+    logs = [open(tmp_path / f"{k}.log", "w+") for k in range(len(LISTENING))]
     together = environment()
     nodes = [
         subprocess.Popen(shlex.split(c), cwd=ROOT, env=together, stdout=log, stderr=log)
@@ -76,17 +95,14 @@ def test_the_nodes_find_each_other(tmp_path):
         )  # fmt: skip
         assert replay.returncode == 0, replay.stdout + replay.stderr
         assert "1201 samples sent" in replay.stdout
+        time.sleep(later)
     finally:
         for node in nodes:
             node.terminate()
         statuses = [node.wait(30) for node in nodes]
     for log in logs:
-        log.seek(0)
-        text = log.read()
         log.close()
-        assert "Traceback" not in text and "not seen" not in text, text
-    assert statuses == [0, 0, 0]
-    assert all(file.stat().st_size > 100_000 for file in written)
+    return statuses, "".join((tmp_path / f"{k}.log").read_text() for k in range(len(logs)))
 
 
 def test_sleds_in_namespaces_are_replayed_side_by_side():
