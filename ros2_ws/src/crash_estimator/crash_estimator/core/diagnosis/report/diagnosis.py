@@ -122,6 +122,9 @@ def diagnose(
     elsewhere = {shift.test: shift.seconds for shift in begun.unused if shift.off(0.0)}  # whatever a filter shows early
     if elsewhere:
         remarks.append(signals_begin(elsewhere))
+    if begun.taken:
+        taken = {shift.test: shift.seconds for shift in begun.taken}
+        remarks.append(f"{signals_begin(taken)}, and are compared from there on")
     if stopped:
         remarks.append(f"stopped after {limit_text(seconds)}: not everything was tried")
     return replace(found, stopped=stopped, text="; ".join([found.text, *remarks]))

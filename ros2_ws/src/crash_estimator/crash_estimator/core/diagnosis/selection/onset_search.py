@@ -35,8 +35,9 @@ class Begun(NamedTuple):
     """What a selection has found, and from which time zeros."""
 
     path: SelectionPath
-    zero: TimeZero | None = None  # None: all as stated
+    zero: TimeZero | None = None  # what is told of them; None: nothing
     unused: tuple[Shift, ...] = ()  # onsets that are elsewhere, and that no recording is taken from
+    taken: tuple[Shift, ...] = ()  # onsets that recordings are taken from, though from there no less is left
 
 
 def select_from_the_onset(
@@ -70,7 +71,8 @@ class _Search:
             if touched and (touched.path.noise or search_is_over()):
                 return touched
         found = self._stated_or_early(zero, elsewhere)
-        if not (touched or search_is_over()) and self._may_begin_elsewhere(found.path, elsewhere):
+        settled = touched or found.taken or search_is_over()
+        if not settled and self._may_begin_elsewhere(found.path, elsewhere):
             if _better(self.in_doubt, found.path):
                 touched = self._from_the_touch(zero.as_stated if zero else found.path.steps[0].before)
         return touched if touched and _better(touched.path, found.path) else found
@@ -84,7 +86,21 @@ class _Search:
             if early.path.noise or search_is_over():
                 return early
         stated = Begun(self._selected(self.as_stated), None, elsewhere)
-        return stated if not zero or stated.path.noise else early
+        if stated.path.noise:
+            return stated
+        return early if zero else self._all_of_the_motion(stated, elsewhere)
+
+    def _all_of_the_motion(self, stated: Begun, elsewhere: tuple[Shift, ...]) -> Begun:
+        """From onsets that come before the stated time zeros beyond doubt, where from there on no more is left than
+        from these: where the crush is measured it makes no difference to what is compared anyway, and how it begins,
+        with the highest rates, is compared as well."""
+        taken = tuple(shift for shift in elsewhere if shift.off(0.0) > FARTHEST * shift.impact[1])
+        if not taken or search_is_over():
+            return stated
+        path = self._selected(self._observed(taken))
+        as_well = TimeZero(taken, stated.path.final).gain(path.final) > -THRESHOLDS.gain
+        unused = tuple(shift for shift in elsewhere if shift not in taken)
+        return Begun(path, None, unused, taken) if as_well else stated
 
     def _begins_early(self, given: Model, early: tuple[Shift, ...]) -> TimeZero | None:
         """None where the model as given leaves noise only, or hardly less from the onsets on."""
