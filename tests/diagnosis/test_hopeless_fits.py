@@ -1,6 +1,5 @@
 """Fits that are given up once it is known that nothing comes of them, and what is fitted once only."""
 
-from itertools import tee
 from types import SimpleNamespace
 
 import numpy as np
@@ -50,7 +49,8 @@ def test_whether_doubts_leave_noise_is_asked_no_further_than_twice_the_noise(mon
     """Of a model that leaves noise with them its fit is wanted, and made to the end."""
     asked = []
     given = SimpleNamespace(fit="given", additions=())
-    path = SimpleNamespace(steps=[SimpleNamespace(before=given)], final=given, noise=False)
+    final = SimpleNamespace(fit="final", additions=("one",))
+    path = SimpleNamespace(steps=[SimpleNamespace(before=given)], final=final, noise=False)
     records = [SimpleNamespace(in_doubt=False, _replace=lambda **more: None)]
     magnitudes = SimpleNamespace(records=records, _replace=lambda records: None)
     monkeypatch.setattr(assumptions, "as_given", lambda *args: (magnitudes, given))
@@ -60,21 +60,31 @@ def test_whether_doubts_leave_noise_is_asked_no_further_than_twice_the_noise(mon
     monkeypatch.setattr(assumptions, "_leaves_noise", lambda model: False)
     monkeypatch.setattr(assumptions, "_in_doubt", lambda doubted, model, hopeless=np.inf: asked.append(hopeless))
     assert assumptions._as_exact_as_needed(None, records, {}) is path
-    assert set(asked) == {100.0 * THRESHOLDS.near_floor}
+    assert asked == [100.0 * THRESHOLDS.near_floor] * 2, "of the model as given, and of the final one"
 
 
 def test_what_is_likely_is_fitted_once_whatever_contacts_are_asked_of_it(monkeypatch):
-    """The best first candidate's other form, under the contacts as they are, for three others that it feels."""
-    fits = []
+    """The best first candidate's other form, under the contacts as they are, for the three others that are asked of."""
+    fits, seen = [], []
     form = SimpleNamespace(key=("stop", "spring"), variant="in_curve")
     best = candidate(900.0, ("stop", "spring"))
     best.addition.variant = ""
-    first = SimpleNamespace(as_recorded=[best], before=SimpleNamespace(additions=()))
-    path = SimpleNamespace(steps=[first], structure=None, records=(), cells=36, final=SimpleNamespace(white=False))
+    first = SimpleNamespace(as_recorded=[best], before=SimpleNamespace(additions=()), best=None)
+    final = SimpleNamespace(white=False, fit=SimpleNamespace(evidence=0.0))
+    path = assumptions.SelectionPath("stated", [first], final, final.fit, (), 36)
     monkeypatch.setattr(contact_promise, "measure_magnitudes", lambda *given: None)
     monkeypatch.setattr(contact_promise, "make_problem", lambda *given: None)
     monkeypatch.setattr(contact_promise, "_in_other_forms", lambda addition: [form])
     monkeypatch.setattr(contact_promise, "fit", lambda problem: fits.append(problem))
-    seen = [[variant for ((addition,), _) in again for variant in [addition.variant]]
-            for again in tee(contact_promise.likely_first(path), 3)]  # fmt: skip
+    for name in ("never_pulling", "elastic_when_spent", "all_when_spent"):
+        monkeypatch.setattr(assumptions, name, lambda structure, name=name: name)
+
+    def promised_by(other, path, likely):
+        seen.append([addition.variant for (addition,), _ in likely])
+        return -np.inf
+
+    monkeypatch.setattr(assumptions, "promised_by", promised_by)
+    monkeypatch.setattr(assumptions, "search_is_over", lambda: False)
+    monkeypatch.setattr(assumptions, "_as_exact_as_needed", lambda *given: path)
+    assert assumptions._selected("stated", (), {}) is path
     assert seen == [["", "in_curve"]] * 3 and len(fits) == 1

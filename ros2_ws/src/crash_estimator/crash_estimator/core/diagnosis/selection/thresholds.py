@@ -40,7 +40,8 @@ class Thresholds(NamedTuple):
     look again takes as long as the first look. Two of one effect that leave less, as neither alone does, are taken
     as found: what they leave is then less than the noise. So is a rare effect, unless a common one leaves as
     little: in two looked-at cases of a gas that gives its heat away the right one left 1.04 and 1.06; a real
-    impactor's damper, which a Maxwell element would else have taken the place of, came below this too."""
+    impactor's damper, which a Maxwell element would else have taken the place of, came below this too. And times the
+    cost of noise from which a model in doubt of masses and zeros is not fitted on: it leaves more than noise."""
     real_structure: float = 100.0
     """Mean square from which on no second effect is looked for at once, and none beyond those that are believed
     together: of a real structure none takes that. Below it what explains less than `named_share` is fitted on, but not
