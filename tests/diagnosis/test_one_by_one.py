@@ -51,7 +51,7 @@ def test_beside_a_rare_effect_only_one_that_leaves_noise_is_added(monkeypatch, n
 
 @pytest.mark.parametrize("rare", [True, False])
 def test_beside_a_rare_effect_only_one_elsewhere_is_looked_at(monkeypatch, rare):
-    beside, elsewhere = (SimpleNamespace(leaves_noise=noise) for noise in (True, False))
+    beside, elsewhere = (SimpleNamespace(leaves_noise=noise, candidates=[]) for noise in (True, False))
     monkeypatch.setattr(forward_selection, "is_rare", lambda addition: rare)
     monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda *given: beside)
     monkeypatch.setattr(forward_selection, "only_screened", lambda *given: "nothing else")
@@ -127,8 +127,9 @@ def one_by_one(
     white = lambda step: len(step.before.additions) + 1 >= noise_with  # noqa: E731
     monkeypatch.setattr(forward_selection, "common_effects", lambda *given: {})
     monkeypatch.setattr(forward_selection, "is_rare", lambda addition: rare)
+    monkeypatch.setattr(forward_selection, "effects_beside", lambda *given: {})
     monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda m, e, before, path: search(before))
-    monkeypatch.setattr(forward_selection, "only_screened", lambda m, e, before: SelectionStep(before, []))
+    monkeypatch.setattr(forward_selection, "only_screened", lambda m, e, before, doubted: SelectionStep(before, []))
     monkeypatch.setattr(SelectionStep, "leaves_noise", property(white))
     monkeypatch.setattr(forward_selection, "as_fitted", lambda before, found: None)
     monkeypatch.setattr(forward_selection, "_all_explain_too_little", hopeless)

@@ -113,18 +113,24 @@ def test_a_rare_effect_that_leaves_less_than_all_common_ones_leads_to_a_pair():
     assert pair == [("maxwell_element", "engine_barrier"), ("channel_gain", "engine_ax")]
 
 
+def test_beside_a_rare_effect_one_without_a_shape_is_found_though_it_is_rare():
+    pair = named("single/force_offset+guide_friction/1/1g/10000Hz/0.75,1.1/18000347")
+    assert set(pair) == {("guide_friction", "car"), ("force_offset", "barrier_fx")}
+
+
 @pytest.mark.parametrize(("first", "common_only"), [("maxwell_element", True), ("cubic_stiffness", False)])
-def test_beside_a_rare_effect_a_second_one_is_looked_for_among_the_common_ones(monkeypatch, first, common_only):
+def test_beside_a_rare_effect_none_is_looked_for_that_is_rare_and_has_a_shape_to_bend(monkeypatch, first, common_only):
     asked = []
     leads = CandidateFit(Addition(EFFECTS[first], "mount"), 1e3, SimpleNamespace(cost=0.0))
-    fit = SimpleNamespace(layout=SimpleNamespace(structure=SimpleNamespace(effects=())))
+    magnitudes = SimpleNamespace(structure=SimpleNamespace(effects=()))
     monkeypatch.setattr(pair_search, "_leading", lambda model, candidates: candidates)
     monkeypatch.setattr(pair_search, "analyse", lambda fit: SimpleNamespace(mean_square=2.0))
     monkeypatch.setattr(pair_search, "on_trial", lambda magnitudes, model, first: (magnitudes, model))
     monkeypatch.setattr(pair_search, "fit_candidates", lambda m, effects, *given, least: asked.append(effects) or [])
-    assert pair_search.two_at_once(None, EFFECTS, SimpleNamespace(fit=fit, records=()), [leads], [], None) is None
+    assert pair_search.two_at_once(magnitudes, EFFECTS, SimpleNamespace(records=()), [leads], [], None) is None
     (effects,) = asked
-    assert effects == (common_effects(fit.layout.structure, EFFECTS) if common_only else EFFECTS)
+    straight = {"force_offset": EFFECTS["force_offset"]}
+    assert effects == (common_effects(magnitudes.structure, EFFECTS) | straight if common_only else EFFECTS)
 
 
 @pytest.mark.parametrize("effect", ["viscous_damping", "cubic_stiffness"])

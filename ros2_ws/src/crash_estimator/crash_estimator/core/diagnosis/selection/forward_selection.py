@@ -11,9 +11,10 @@ from .even_fit import evenly_fitted
 from .fitted_model import Model
 from .pair_search import Pair, near_the_floor, two_at_once, two_of_one_effect
 from .pruning import up_to_the_least_error, without_the_superseded
-from .rare_effects import common_effects, elsewhere_than, is_rare, with_rare_ones
+from .rare_effects import common_effects, effects_beside, elsewhere_than, is_rare, with_rare_ones
 from .search_limit import search_is_over
 from .selection_step import SelectionStep, added, as_fitted, band_of_steps, in_recorded_noise, only_screened, weighed
+from .sequential_replacement import replaced
 from .thresholds import THRESHOLDS
 
 
@@ -28,23 +29,30 @@ def forward_selection(
 ) -> tuple[list[SelectionStep], Model]:
     """All steps, and the last model; given: what it starts from, first: its `first_step`."""
     alike: list[Pair] = []
+    begun: Pair | None = None
     if not (first.leaves_noise or _explains_nearly_all(first) or search_is_over()):
         alike = two_of_one_effect(magnitudes, given, first.candidates)
-        if pair := near_the_floor(alike, first.candidates):
-            return _one_by_one(pair.magnitudes, effects, pair.model, pair.path)
-    path, final = _one_by_one(magnitudes, effects, given, [], first)
-    next_to_nothing = share_removed(given.residuals, final.residuals) > THRESHOLDS.all_but_folds
+        begun = near_the_floor(alike, first.candidates)
+    path, final = _from_two(effects, begun) if begun else _one_by_one(magnitudes, effects, given, [], first)
+    if others := replaced(magnitudes, effects, given, path, final):
+        return _from_two(effects, others)
+    next_to_nothing = begun or share_removed(given.residuals, final.residuals) > THRESHOLDS.all_but_folds
     if final.white or next_to_nothing or search_is_over():
         return path, final
     firsts = [*first.doubted, *first.as_recorded]
     pair = two_at_once(magnitudes, effects, given, firsts, alike, _followed(path))
     if pair is None:
         return path, final
-    other = _one_by_one(pair.magnitudes, effects, pair.model, pair.path)
+    other = _from_two(effects, pair)
     if other[1].white:
         return other
     paths = [up_to_the_least_error(*one) for one in (other, (path, final))]
     return min(paths, key=lambda one: one[1].residuals.mean_square)
+
+
+def _from_two(effects: Mapping[str, Effect], pair: Pair) -> tuple[list[SelectionStep], Model]:
+    """On from two that were found at once."""
+    return _one_by_one(pair.magnitudes, effects, pair.model, pair.path)
 
 
 def _one_by_one(
@@ -56,10 +64,11 @@ def _one_by_one(
     common, evenly = common_effects(magnitudes.structure, effects), None
     while not (path and search_is_over()):
         if first is None:
-            first = _next_step(magnitudes, common, model, path)
-            found = model.found
-            if len(found) < THRESHOLDS.most_at_once and not any(map(is_rare, found)):
-                first = with_rare_ones(magnitudes, effects, first, found)
+            rare = any(map(is_rare, model.found))
+            beside = effects_beside(model.found, magnitudes.structure, effects) if rare else common
+            first = _next_step(magnitudes, beside, model, path)
+            if not rare and len(model.found) < THRESHOLDS.most_at_once:
+                first = with_rare_ones(magnitudes, effects, first, model.found)
         if not path and _none_leads(first):
             once = weighed(magnitudes, common, first, noises=1)
             if _none_leads(once):
@@ -111,17 +120,18 @@ def _next_step(
     """All candidates for one more addition; only screened where none would be believed beside those found: beside a
     rare one or beyond two only one that leaves noise is, and none that removes next to nothing, but of what a real
     structure leaves, where the sensors' noise counts for little."""
-    found = model.found
+    found, tried = model.found, []
     rare = [one for one in found if is_rare(one)]
     only_to_noise = len(found) >= THRESHOLDS.most_at_once or rare
     far_from_noise = model.residuals.mean_square >= THRESHOLDS.real_structure
     if not (only_to_noise and far_from_noise):
         step = in_recorded_noise(magnitudes, effects, model, path)
+        tried = step.candidates[:1]
         step = elsewhere_than(rare, step) if rare else step
         in_vain = only_to_noise or (found and not far_from_noise and _all_explain_too_little(step, path))
         if step.leaves_noise or not in_vain:
             return step
-    return only_screened(magnitudes, effects, model)
+    return only_screened(magnitudes, effects, model, tried)
 
 
 def _all_explain_too_little(step: SelectionStep, path: Sequence[SelectionStep]) -> bool:

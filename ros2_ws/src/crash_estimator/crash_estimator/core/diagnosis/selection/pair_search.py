@@ -11,7 +11,7 @@ from ..residuals.residuals import analyse
 from .acceptance import cost_of_noise, explains_too_little, share_removed
 from .candidate_fits import CandidateFit, fit_candidates
 from .fitted_model import Model, fit_model
-from .rare_effects import common_effects, is_rare
+from .rare_effects import effects_beside
 from .selection_step import SelectionStep, added, as_fitted, on_trial
 from .thresholds import THRESHOLDS
 
@@ -73,25 +73,33 @@ def _together(
 
 def near_the_floor(pairs: Sequence[Pair], candidates: Sequence[CandidateFit]) -> Pair | None:
     """The one that leaves next to nothing, where no candidate alone does."""
-    leader = next(iter(_likely(candidates)), None)
+    leader = next(iter(likely(candidates)), None)
     if not pairs or leader is None or analyse(leader.fit).mean_square < THRESHOLDS.near_floor:
         return None
     best = min(pairs, key=lambda pair: pair.model.residuals.mean_square)
-    return best if best.model.residuals.mean_square < THRESHOLDS.near_floor else None
+    leaves_less = best.model.fit.cost < leader.fit.cost
+    return best if leaves_less and best.model.residuals.mean_square < THRESHOLDS.near_floor else None
 
 
 def _all_but_folds(model: Model, pair: Pair) -> bool:
     return share_removed(model.residuals, pair.model.residuals) > THRESHOLDS.all_but_folds
 
 
-def _likely(candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
+def leaves_next_to_nothing(of: Model, both: Model) -> bool:
+    """Less than the noise again, of what another model leaves: the rest may be the form of a law."""
+    near = both.residuals.mean_square < THRESHOLDS.near_floor
+    return near and share_removed(of.residuals, both.residuals) > THRESHOLDS.all_but_folds
+
+
+def likely(candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
+    """Those that gain enough to be one of two."""
     return [one for one in candidates if one.fit and one.gain > THRESHOLDS.gain_in_pair]
 
 
 def _leading(model: Model, candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
     """The likely ones that explain not too little to be one of two."""
     band = band_of(model.records, model.residuals)
-    return [one for one in _likely(candidates) if not explains_too_little(model, as_fitted(model, one), band)]
+    return [one for one in likely(candidates) if not explains_too_little(model, as_fitted(model, one), band)]
 
 
 def _one_after_the_other(magnitudes: Magnitudes, effects, model: Model, candidates, followed) -> Iterator[Pair]:
@@ -100,12 +108,12 @@ def _one_after_the_other(magnitudes: Magnitudes, effects, model: Model, candidat
         if first.addition.key == followed or analyse(first.fit).mean_square >= THRESHOLDS.real_structure:
             continue
         wider, larger = on_trial(magnitudes, model, first)
-        beside = common_effects(model.fit.layout.structure, effects) if is_rare(first.addition) else effects
+        beside = effects_beside([first.addition], magnitudes.structure, effects)
         seconds = fit_candidates(wider, beside, larger, least=cost_of_noise(model.records))
-        best = next(iter(_likely(seconds)), None)
+        best = next(iter(likely(seconds)), None)
         if best is None:
             continue
         widest, both = added(wider, larger, best)
-        if both.white:
+        if both.white or leaves_next_to_nothing(model, both):
             others = [one for one in candidates if one is not first]
             yield Pair(widest, both, [SelectionStep(model, [first, *others]), SelectionStep(larger, seconds)])

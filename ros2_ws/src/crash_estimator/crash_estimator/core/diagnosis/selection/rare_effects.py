@@ -1,6 +1,7 @@
 """Rare effects bend far, and two of them would follow most that no vocabulary has: they are asked after the common
 ones, alone or beside one of those, and believed only where what is left is noise, or next to nothing where no common
-one comes near. Beside a rare one that was found another one is added only where noise is left, and no rare one."""
+one comes near. Beside a rare one that was found another one is added only where noise is left, and no rare one but
+those that have no shape constant to bend."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -22,6 +23,16 @@ def common_effects(structure: Structure, effects: Mapping[str, Effect]) -> Mappi
     has = {spec.type for spec in structure.effects}
     found = {name: effect if name in has else effect.common() for name, effect in effects.items()}
     return {name: effect for name, effect in found.items() if effect}
+
+
+def effects_beside(
+    found: Iterable[Addition], structure: Structure, effects: Mapping[str, Effect]
+) -> Mapping[str, Effect]:
+    """All; beside a rare one the common ones, and of the rare ones those that have no shape constant."""
+    if not any(map(is_rare, found)):
+        return effects
+    straight = {name: effect for name, effect in effects.items() if not effect.shapes}
+    return {**common_effects(structure, effects), **straight}
 
 
 def found_as_common(effects: Mapping[str, Effect], found: Iterable[Addition]) -> Mapping[str, Effect]:

@@ -30,7 +30,7 @@ class SelectionStep(NamedTuple):
     candidates: list[CandidateFit]
     as_recorded: Sequence[CandidateFit] = ()  # in the sensors' noise, where `candidates` are in a larger one
     evenly: Model | None = None  # the model before it as its size is told, where noise was taken larger
-    doubted: Sequence[CandidateFit] = ()  # a rare one that leaves less than all of them, and is not believed alone
+    doubted: Sequence[CandidateFit] = ()  # one that leaves less than all of them, and is not believed alone
 
     @property
     def sized(self) -> Model:
@@ -61,10 +61,12 @@ def in_recorded_noise(
     return SelectionStep(model, found, found)
 
 
-def only_screened(magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model) -> SelectionStep:
-    """All candidates, where none would be believed."""
+def only_screened(
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, doubted: Sequence[CandidateFit]
+) -> SelectionStep:
+    """All candidates, where none would be believed; doubted: those that were fitted nevertheless."""
     found = screen_candidates(magnitudes, effects, model)
-    return SelectionStep(model, found, found)
+    return SelectionStep(model, found, found, doubted=doubted)
 
 
 def weighed(
@@ -101,7 +103,7 @@ def weighed(
             others = fit_candidates(magnitudes, effects, before, in_other_noise=[*new, *found])
         else:
             others = screen_candidates(magnitudes, effects, before)
-        done = SelectionStep(before, others, found)
+        done = SelectionStep(before, others, found, doubted=done.doubted)
     known = [evenly] if evenly else []
     return done._replace(evenly=evenly_fitted(done.before, band_of_steps([*path, done]), *known))
 

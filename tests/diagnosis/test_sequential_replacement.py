@@ -1,0 +1,95 @@
+"""Two effects in the place of those that were found one after the other."""
+
+from types import SimpleNamespace
+
+import pytest
+from helpers_made_up_fits import candidate
+
+from crash_estimator.benchmarks.effects_judge import drawn
+from crash_estimator.benchmarks.effects_plan import case_of
+from crash_estimator.core.diagnosis import diagnose
+from crash_estimator.core.diagnosis.selection import sequential_replacement
+from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
+from crash_estimator.core.diagnosis.selection.thresholds import THRESHOLDS
+
+MAGNITUDES = SimpleNamespace(structure=None)
+FRICTION, DAMPING, GAS, RATE = (SimpleNamespace(key=(name, "mount")) for name in ("friction", "damping", "gas", "rate"))
+
+
+def test_the_second_of_two_effects_shows_that_the_first_is_another_one():
+    """While the gas at the engine is missing, a Maxwell element at the cab leaves less than its damper does."""
+    _, structure, recordings = drawn(case_of("frontal/gas_cushion+viscous_damping/1/1g/10000Hz/0.75,1.1/20000486"))
+    found = diagnose(structure, recordings)
+    assert found.verdict == "effect_missing" and found.complete
+    assert {(step.effect, step.target) for step in found.steps} == {
+        ("viscous_damping", "cab_barrier"), ("gas_cushion", "engine_barrier"),
+    }  # fmt: skip
+
+
+def model(mean_square: float, *found, evidence: float = 0.0, inflated: bool = False):
+    fit = SimpleNamespace(evidence=evidence, problem=SimpleNamespace(noise_is_inflated=inflated))
+    residuals, white = SimpleNamespace(mean_square=mean_square), mean_square < 1.01
+    return SimpleNamespace(
+        fit=fit, residuals=residuals, white=white, found=found, additions=found, given=(), records=()
+    )
+
+
+def sought(monkeypatch, found, beside: dict, final, path):
+    """The additions of the pair that takes the place of the final model's; beside: what is best beside an addition, and
+    the model with both."""
+    monkeypatch.setattr(sequential_replacement, "search_is_over", lambda: False)
+    monkeypatch.setattr(sequential_replacement, "cost_of_noise", lambda records: 0.0)
+    monkeypatch.setattr(sequential_replacement, "effects_beside", lambda found, *given: {})
+    monkeypatch.setattr(sequential_replacement, "as_found", lambda one: one.addition)
+    monkeypatch.setattr(sequential_replacement, "analyse", lambda fit: SimpleNamespace(mean_square=1.5))
+    monkeypatch.setattr(sequential_replacement, "fit_model", lambda m, records, additions: model(9.0, *additions))
+    monkeypatch.setattr(sequential_replacement, "on_trial", lambda m, given, first: (m, model(9.0, first.addition)))
+    asked = []
+
+    def best(magnitudes, effects, larger, least):
+        asked.append(larger.found[0])
+        return [candidate(500.0)._replace(addition=beside[larger.found[0].key][0])]
+
+    monkeypatch.setattr(sequential_replacement, "fit_candidates", best)
+    monkeypatch.setattr(sequential_replacement, "added", lambda m, larger, one: (m, beside[larger.found[0].key][1]))
+    pair = sequential_replacement.replaced(MAGNITUDES, {}, model(50.0), path, final)
+    return asked, pair and pair.model
+
+
+@pytest.fixture
+def path():
+    """Friction was found first, and a rate effect is the best beside it."""
+    first = SelectionStep(model(50.0), [candidate(900.0)], [candidate(900.0)])
+    second = candidate(500.0)._replace(addition=RATE)
+    return [first, SelectionStep(model(3.0, FRICTION), [second], [second])]
+
+
+def test_each_is_sought_anew_beside_the_other_until_two_leave_noise(monkeypatch, path):
+    both = model(1.0, DAMPING, GAS)
+    beside = {RATE.key: (DAMPING, model(1.4, RATE, DAMPING)), DAMPING.key: (GAS, both)}
+    assert sought(monkeypatch, path, beside, model(1.5, FRICTION, RATE), path) == ([RATE, DAMPING], both)
+
+
+def test_where_the_same_is_best_again_there_are_no_others(monkeypatch, path):
+    beside = {RATE.key: (FRICTION, model(1.4, RATE, FRICTION))}
+    assert sought(monkeypatch, path, beside, model(1.5, FRICTION, RATE), path) == ([RATE], None)
+
+
+@pytest.mark.parametrize(("ahead", "taken"), [(THRESHOLDS.gain + 1.0, True), (THRESHOLDS.gain - 1.0, False)])
+def test_of_two_pairs_that_leave_noise_the_other_must_be_likelier_by_as_much_as_counts(monkeypatch, path, ahead, taken):
+    final, other = model(1.0, FRICTION, RATE, evidence=100.0), model(1.0, RATE, DAMPING, evidence=100.0 + ahead)
+    beside = {RATE.key: (DAMPING, other), DAMPING.key: (RATE, other)}
+    _, pair = sought(monkeypatch, path, beside, final, path)
+    assert pair is (other if taken else None)
+
+
+@pytest.mark.parametrize(("left", "taken"), [(1.5, True), (2.5, False)])
+def test_two_that_leave_next_to_nothing_of_what_was_left_are_taken_too(monkeypatch, path, left, taken):
+    other = model(left, RATE, DAMPING)
+    beside = {RATE.key: (DAMPING, other), DAMPING.key: (RATE, other)}
+    _, pair = sought(monkeypatch, path, beside, model(90.0, FRICTION, RATE), path)
+    assert pair is (other if taken else None)
+
+
+def test_nothing_is_sought_where_one_effect_leaves_noise(monkeypatch, path):
+    assert sought(monkeypatch, path, {}, model(1.0, FRICTION), path) == ([], None)
