@@ -34,15 +34,16 @@ def model(mean_square: float, *found, evidence: float = 0.0, inflated: bool = Fa
     )
 
 
-def sought(monkeypatch, found, beside: dict, final, path):
-    """The additions of the pair that takes the place of the final model's; beside: what is best beside an addition, and
-    the model with both."""
+def sought(monkeypatch, beside: dict, final, path, fitted=lambda m, records, additions: model(9.0, *additions)):
+    """What others were sought beside, and the pair that takes the place of the final model's two; beside: what is best
+    beside an addition, and the model with both."""
     monkeypatch.setattr(sequential_replacement, "search_is_over", lambda: False)
     monkeypatch.setattr(sequential_replacement, "cost_of_noise", lambda records: 0.0)
     monkeypatch.setattr(sequential_replacement, "effects_beside", lambda found, *given: {})
     monkeypatch.setattr(sequential_replacement, "as_found", lambda one: one.addition)
     monkeypatch.setattr(sequential_replacement, "analyse", lambda fit: SimpleNamespace(mean_square=1.5))
-    monkeypatch.setattr(sequential_replacement, "fit_model", lambda m, records, additions: model(9.0, *additions))
+    monkeypatch.setattr(sequential_replacement, "fit_model", fitted)
+    monkeypatch.setattr(sequential_replacement, "as_fitted", lambda given, one: model(9.0, one.addition))
     monkeypatch.setattr(sequential_replacement, "on_trial", lambda m, given, first: (m, model(9.0, first.addition)))
     asked = []
 
@@ -52,8 +53,7 @@ def sought(monkeypatch, found, beside: dict, final, path):
 
     monkeypatch.setattr(sequential_replacement, "fit_candidates", best)
     monkeypatch.setattr(sequential_replacement, "added", lambda m, larger, one: (m, beside[larger.found[0].key][1]))
-    pair = sequential_replacement.replaced(MAGNITUDES, {}, model(50.0), path, final)
-    return asked, pair and pair.model
+    return asked, sequential_replacement.replaced(MAGNITUDES, {}, model(50.0), path, final)
 
 
 @pytest.fixture
@@ -67,29 +67,44 @@ def path():
 def test_each_is_sought_anew_beside_the_other_until_two_leave_noise(monkeypatch, path):
     both = model(1.0, DAMPING, GAS)
     beside = {RATE.key: (DAMPING, model(1.4, RATE, DAMPING)), DAMPING.key: (GAS, both)}
-    assert sought(monkeypatch, path, beside, model(1.5, FRICTION, RATE), path) == ([RATE, DAMPING], both)
+    asked, pair = sought(monkeypatch, beside, model(1.5, FRICTION, RATE), path)
+    assert asked == [RATE, DAMPING] and pair.model is both
+
+
+@pytest.mark.parametrize("larger", [DAMPING, GAS])
+def test_of_two_that_take_the_place_what_explains_more_alone_comes_first(monkeypatch, path, larger):
+    beside = {RATE.key: (DAMPING, model(1.4, RATE, DAMPING)), DAMPING.key: (GAS, model(1.0, DAMPING, GAS))}
+
+    def fitted(magnitudes, records, additions):
+        return model(
+            1.0 if len(additions) == 2 else 9.0, *additions, evidence=800.0 if additions[0] is larger else 700.0
+        )
+
+    _, pair = sought(monkeypatch, beside, model(1.5, FRICTION, RATE), path, fitted)
+    leaders = [step.candidates[0].addition for step in pair.path]
+    assert leaders == list(pair.model.found) and leaders[0] is larger
 
 
 def test_where_the_same_is_best_again_there_are_no_others(monkeypatch, path):
     beside = {RATE.key: (FRICTION, model(1.4, RATE, FRICTION))}
-    assert sought(monkeypatch, path, beside, model(1.5, FRICTION, RATE), path) == ([RATE], None)
+    assert sought(monkeypatch, beside, model(1.5, FRICTION, RATE), path) == ([RATE], None)
 
 
 @pytest.mark.parametrize(("ahead", "taken"), [(THRESHOLDS.gain + 1.0, True), (THRESHOLDS.gain - 1.0, False)])
 def test_of_two_pairs_that_leave_noise_the_other_must_be_likelier_by_as_much_as_counts(monkeypatch, path, ahead, taken):
     final, other = model(1.0, FRICTION, RATE, evidence=100.0), model(1.0, RATE, DAMPING, evidence=100.0 + ahead)
     beside = {RATE.key: (DAMPING, other), DAMPING.key: (RATE, other)}
-    _, pair = sought(monkeypatch, path, beside, final, path)
-    assert pair is (other if taken else None)
+    _, pair = sought(monkeypatch, beside, final, path)
+    assert (pair and pair.model) is (other if taken else None)
 
 
 @pytest.mark.parametrize(("left", "taken"), [(1.5, True), (2.5, False)])
 def test_two_that_leave_next_to_nothing_of_what_was_left_are_taken_too(monkeypatch, path, left, taken):
     other = model(left, RATE, DAMPING)
     beside = {RATE.key: (DAMPING, other), DAMPING.key: (RATE, other)}
-    _, pair = sought(monkeypatch, path, beside, model(90.0, FRICTION, RATE), path)
-    assert pair is (other if taken else None)
+    _, pair = sought(monkeypatch, beside, model(90.0, FRICTION, RATE), path)
+    assert (pair and pair.model) is (other if taken else None)
 
 
 def test_nothing_is_sought_where_one_effect_leaves_noise(monkeypatch, path):
-    assert sought(monkeypatch, path, {}, model(1.0, FRICTION), path) == ([], None)
+    assert sought(monkeypatch, {}, model(1.0, FRICTION), path) == ([], None)

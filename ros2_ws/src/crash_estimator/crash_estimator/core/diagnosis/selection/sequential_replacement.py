@@ -3,8 +3,6 @@ was missing (Miller, Subset Selection in Regression, 2nd edition 2002, chapter 3
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from ...effects.effect import Addition, Effect
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
@@ -14,7 +12,7 @@ from .fitted_model import Model, fit_model
 from .pair_search import Pair, leaves_next_to_nothing, likely
 from .rare_effects import effects_beside
 from .search_limit import search_is_over
-from .selection_step import SelectionStep, added, as_found, on_trial
+from .selection_step import SelectionStep, added, as_fitted, as_found, on_trial
 from .thresholds import THRESHOLDS
 
 
@@ -29,12 +27,19 @@ def replaced(
     two = _two_that_explain_most(path, final)
     if len(two) < 2 or search_is_over():
         return None
-    as_likely = final.white and not final.fit.problem.noise_is_inflated
-    least = final.fit.evidence + THRESHOLDS.gain if as_likely else -np.inf
+
+    def alone(addition: Addition) -> CandidateFit:
+        model = fit_model(magnitudes, given.records, [*given.additions, addition])
+        return CandidateFit(addition, model.fit.evidence - given.fit.evidence, model.fit)
+
+    def instead(both: Model) -> bool:
+        if final.white and not final.fit.problem.noise_is_inflated:
+            return both.white and both.fit.evidence > final.fit.evidence + THRESHOLDS.gain
+        return both.white or (not final.white and leaves_next_to_nothing(final, both))
+
     before, kept = two
     for _ in range(THRESHOLDS.few):
-        alone = fit_model(magnitudes, given.records, [*given.additions, kept])
-        first = CandidateFit(kept, alone.fit.evidence - given.fit.evidence, alone.fit)
+        first = alone(kept)
         wider, larger = on_trial(magnitudes, given, first)
         beside = effects_beside([kept], magnitudes.structure, effects)
         seconds = fit_candidates(wider, beside, larger, least=cost_of_noise(given.records))
@@ -42,11 +47,17 @@ def replaced(
         if best is None or best.addition.key == before.key:
             return None
         widest, both = added(wider, larger, best)
-        better = both.white and both.fit.evidence > least
-        if better or (not final.white and leaves_next_to_nothing(final, both)):
+        if instead(both):
+            other = alone(as_found(best))
+            turned = fit_model(widest, given.records, [*given.additions, other.addition, kept])
+            if other.gain > first.gain and instead(turned):  # what explains more comes first
+                last = CandidateFit(kept, turned.fit.evidence - other.fit.evidence, turned.fit)
+                first, larger, both, seconds = other, as_fitted(given, other), turned, [last]
             # those ahead of it alone are not beside the second
-            others = [one for one in path[0].as_recorded if one.addition.key != kept.key and one.gain < first.gain]
-            return Pair(widest, both, [SelectionStep(given, [first, *others]), SelectionStep(larger, seconds)])
+            rest = [
+                one for one in path[0].as_recorded if one.gain < first.gain and one.addition.key != first.addition.key
+            ]
+            return Pair(widest, both, [SelectionStep(given, [first, *rest]), SelectionStep(larger, seconds)])
         before, kept = kept, best.addition
     return None
 
