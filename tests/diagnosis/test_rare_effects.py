@@ -113,11 +113,6 @@ def test_a_rare_effect_that_leaves_less_than_all_common_ones_leads_to_a_pair():
     assert pair == [("maxwell_element", "engine_barrier"), ("channel_gain", "engine_ax")]
 
 
-def test_beside_a_rare_effect_one_without_a_shape_is_found_though_it_is_rare():
-    pair = named("single/force_offset+guide_friction/1/1g/10000Hz/0.75,1.1/18000347")
-    assert set(pair) == {("guide_friction", "car"), ("force_offset", "barrier_fx")}
-
-
 @pytest.mark.parametrize(("first", "common_only"), [("maxwell_element", True), ("cubic_stiffness", False)])
 def test_beside_a_rare_effect_none_is_looked_for_that_is_rare_and_has_a_shape_to_bend(monkeypatch, first, common_only):
     asked = []

@@ -105,15 +105,6 @@ def test_an_effect_on_two_elements_is_looked_for_only_where_one_does_not_explain
     assert bool(asked) == looked_for
 
 
-@pytest.mark.parametrize(("costs", "taken"), [(200.0, False), (400.0, True)])
-def test_two_of_one_effect_are_taken_where_they_leave_less_than_the_best_one(monkeypatch, costs, taken):
-    """Which may not have settled: its motion leaves far more than its fit says."""
-    leader = candidate(900.0)._replace(fit=SimpleNamespace(cost=costs))
-    pair = SimpleNamespace(model=model(cost=300.0, mean_square=1.5))
-    monkeypatch.setattr(pair_search, "analyse", lambda fit: SimpleNamespace(mean_square=4.0))
-    assert pair_search.near_the_floor([pair], [leader]) is (pair if taken else None)
-
-
 def test_the_first_effect_of_a_path_was_followed_where_a_second_was_fitted_beside_it():
     one = SimpleNamespace(key=("friction", "spring"))
     first = SimpleNamespace(before=model(), candidates=[candidate(500.0)])
