@@ -85,12 +85,6 @@ def _all_but_folds(model: Model, pair: Pair) -> bool:
     return share_removed(model.residuals, pair.model.residuals) > THRESHOLDS.all_but_folds
 
 
-def leaves_next_to_nothing(of: Model, both: Model) -> bool:
-    """Less than the noise again, of what another model leaves: the rest may be the form of a law."""
-    near = both.residuals.mean_square < THRESHOLDS.near_floor
-    return near and share_removed(of.residuals, both.residuals) > THRESHOLDS.all_but_folds
-
-
 def likely(candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
     """Those that gain enough to be one of two."""
     return [one for one in candidates if one.fit and one.gain > THRESHOLDS.gain_in_pair]
@@ -114,6 +108,6 @@ def _one_after_the_other(magnitudes: Magnitudes, effects, model: Model, candidat
         if best is None:
             continue
         widest, both = added(wider, larger, best)
-        if both.white or leaves_next_to_nothing(model, both):
+        if both.white:
             others = [one for one in candidates if one is not first]
             yield Pair(widest, both, [SelectionStep(model, [first, *others]), SelectionStep(larger, seconds)])

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from ...effects.effect import Addition, Effect
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
-from .acceptance import cost_of_noise
+from .acceptance import cost_of_noise, share_removed
 from .candidate_fits import CandidateFit, fit_candidates
 from .fitted_model import Model, fit_model
-from .pair_search import Pair, leaves_next_to_nothing, likely
+from .pair_search import Pair, likely
 from .rare_effects import effects_beside
 from .search_limit import search_is_over
 from .selection_step import SelectionStep, added, as_fitted, as_found, on_trial
@@ -35,7 +35,7 @@ def replaced(
     def instead(both: Model) -> bool:
         if final.white and not final.fit.problem.noise_is_inflated:
             return both.white and both.fit.evidence > final.fit.evidence + THRESHOLDS.gain
-        return both.white or (not final.white and leaves_next_to_nothing(final, both))
+        return both.white or (not final.white and _leaves_next_to_nothing(final, both))
 
     before, kept = two
     for _ in range(THRESHOLDS.few):
@@ -72,3 +72,9 @@ def _two_that_explain_most(path: Sequence[SelectionStep], final: Model) -> Seque
     if second is None or analyse(second.fit).mean_square >= THRESHOLDS.real_structure:
         return ()
     return step.before.found[0], as_found(second)
+
+
+def _leaves_next_to_nothing(found: Model, both: Model) -> bool:
+    """Less than the noise again, of what was left by those found one by one: the rest may be the form of a law."""
+    near = both.residuals.mean_square < THRESHOLDS.near_floor
+    return near and share_removed(found.residuals, both.residuals) > THRESHOLDS.all_but_folds

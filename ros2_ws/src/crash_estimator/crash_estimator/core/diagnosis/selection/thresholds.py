@@ -80,8 +80,8 @@ class Thresholds(NamedTuple):
     more, the others 0.78 and 0.85. Of 24 recordings of a real impactor that yields `yielding` explained 0.95 and more,
     with a delay or not, in 19. And share by which a model must leave less from its onset on where it leaves far more
     than noise: of four looked-at tests 3 to 8 ms late all did by 0.99 and more. And share of what was found one by one
-    leaves that two others must remove, where they leave less than the noise again: of 57 looked-at simulated pairs two
-    are told rightly so, and of 43 cases outside the vocabulary none more is named."""
+    leaves that two others must remove, where they leave less than the noise again: one of 57 looked-at simulated pairs
+    is told rightly so; asked of what is left as given, a real impactor's damper was told as two other effects."""
 
     # What is said, of what leaves more than noise
     most_at_once: int = 2
