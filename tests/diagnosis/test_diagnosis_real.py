@@ -28,8 +28,8 @@ def programmed(path: Path) -> float:
     return PROGRAMMED[re.search(r"_(\d+)damping", path.name).group(1)]
 
 
-DAMPED = [CYBERDIVER / f"linear_damped__15npmm_{name}damping_trial1.csv" for name in ("4mps_025", "6mps_05")]
-"""Both speeds and both dampers."""
+DAMPED = [CYBERDIVER / f"linear_damped__15npmm_{name}damping_trial1.csv" for name in ("2mps_05", "4mps_025", "6mps_05")]
+"""Both dampers, and the weakest impact, of which two other effects leave less than the noise again."""
 
 SPRINGS = ("5npmm_6mps", "15npmm_2mps", "15npmm_6mps", "45npmm_4mps")
 UNDAMPED = [CYBERDIVER / f"linear_undamped__{spring}_trial1.csv" for spring in SPRINGS]
