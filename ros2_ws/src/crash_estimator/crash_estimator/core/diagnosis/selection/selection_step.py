@@ -30,7 +30,7 @@ class SelectionStep(NamedTuple):
     candidates: list[CandidateFit]
     as_recorded: Sequence[CandidateFit] = ()  # in the sensors' noise, where `candidates` are in a larger one
     evenly: Model | None = None  # the model before it as its size is told, where noise was taken larger
-    doubted: Sequence[CandidateFit] = ()  # one that leaves less than all of them, and is not believed alone
+    doubted: Sequence[CandidateFit] = ()  # fitted, and not believed: a rare one alone, or any beside those found
 
     @property
     def sized(self) -> Model:

@@ -49,10 +49,11 @@ def replaced(
         widest, both = added(wider, larger, best)
         if instead(both):
             other = alone(as_found(best))
-            turned = fit_model(widest, given.records, [*given.additions, other.addition, kept])
-            if other.gain > first.gain and instead(turned):  # what explains more comes first
-                last = CandidateFit(kept, turned.fit.evidence - other.fit.evidence, turned.fit)
-                first, larger, both, seconds = other, as_fitted(given, other), turned, [last]
+            if other.gain > first.gain:  # what explains more comes first
+                turned = fit_model(widest, given.records, [*given.additions, other.addition, kept])
+                if instead(turned):
+                    last = CandidateFit(kept, turned.fit.evidence - other.fit.evidence, turned.fit)
+                    first, larger, both, seconds = other, as_fitted(given, other), turned, [last]
             # those ahead of it alone are not beside the second
             rest = [
                 one for one in path[0].as_recorded if one.gain < first.gain and one.addition.key != first.addition.key
