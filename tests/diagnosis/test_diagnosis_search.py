@@ -86,7 +86,7 @@ def test_what_is_not_white_in_the_sensors_noise_stays_unexplained_in_a_larger_on
     ("effect", "seed", "noise"),
     [
         ("coulomb_friction", 620016, 0.5),  # a light door between stiff elements: only small steps settle it
-        ("plastic_unloading", 620058, 0.5),  # so does the look at the slope over its value
+        ("plastic_unloading", 620058, 0.5),  # screened from the fit without it, it promises 1 to 6 nats
         ("load_path", 8000421, 1.0),  # it pulls: the way in which it carries that screens best does not
         ("plastic_unloading", 620056, 0.5),  # found in the sensors' noise, lost in a larger one
         ("quadratic_damping", 8000521, 0.5),  # a fold within a cell, for which a gain and a mass stood

@@ -140,7 +140,7 @@ def one_by_one(
     monkeypatch.setattr(
         forward_selection,
         "added",
-        lambda m, before, best: (m, model(0.9 * (before.residuals.mean_square), len(before.additions) + 1)),
+        lambda m, before, best: model(0.9 * (before.residuals.mean_square), len(before.additions) + 1),
     )
     monkeypatch.setattr(forward_selection, "band_of_steps", lambda path: None)
     monkeypatch.setattr(forward_selection, "evenly_fitted", lambda *given: "with it")

@@ -120,7 +120,7 @@ def test_beside_a_rare_effect_none_is_looked_for_that_is_rare_and_has_a_shape_to
     magnitudes = SimpleNamespace(structure=SimpleNamespace(effects=()))
     monkeypatch.setattr(pair_search, "_leading", lambda model, candidates: candidates)
     monkeypatch.setattr(pair_search, "analyse", lambda fit: SimpleNamespace(mean_square=2.0))
-    monkeypatch.setattr(pair_search, "on_trial", lambda magnitudes, model, first: (magnitudes, model))
+    monkeypatch.setattr(pair_search, "as_fitted", lambda model, first: model)
     monkeypatch.setattr(pair_search, "fit_candidates", lambda m, effects, *given, least: asked.append(effects) or [])
     assert pair_search.two_at_once(magnitudes, EFFECTS, SimpleNamespace(records=()), [leads], [], None) is None
     (effects,) = asked

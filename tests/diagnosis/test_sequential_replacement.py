@@ -56,7 +56,6 @@ def sought(monkeypatch, beside: dict, final, path, fitted=lambda m, records, add
     monkeypatch.setattr(sequential_replacement, "analyse", lambda fit: SimpleNamespace(mean_square=1.5))
     monkeypatch.setattr(sequential_replacement, "fit_model", fitted)
     monkeypatch.setattr(sequential_replacement, "as_fitted", lambda given, one: model(9.0, one.addition))
-    monkeypatch.setattr(sequential_replacement, "on_trial", lambda m, given, first: (m, model(9.0, first.addition)))
     asked = []
 
     def best(magnitudes, effects, larger, least):
@@ -64,7 +63,7 @@ def sought(monkeypatch, beside: dict, final, path, fitted=lambda m, records, add
         return [candidate(500.0)._replace(addition=beside[larger.found[0].key][0])]
 
     monkeypatch.setattr(sequential_replacement, "fit_candidates", best)
-    monkeypatch.setattr(sequential_replacement, "added", lambda m, larger, one: (m, beside[larger.found[0].key][1]))
+    monkeypatch.setattr(sequential_replacement, "added", lambda m, larger, one: beside[larger.found[0].key][1])
     return asked, sequential_replacement.replaced(MAGNITUDES, {}, model(50.0), path, final)
 
 

@@ -92,7 +92,6 @@ class Effect:
     replaces: ClassVar[str] = ""  # the element's key in a model file that it takes the place of
 
     # How a diagnosis searches for it
-    profiled: ClassVar[bool] = False  # its coefficient says when a force jumps to zero: the cost has a V over it
     restated: ClassVar[bool] = False  # the literature states the coefficient otherwise than it is fitted
 
     @property
@@ -108,11 +107,6 @@ class Effect:
     def only_distorts(self) -> bool:
         """With the channels mended nothing is left of it."""
         return bool(self.distorts) and self.acts_on == "channel"
-
-    @property
-    def is_of_the_recording(self) -> bool:
-        """Not the structure is wrong, but what was measured or stated of its motion."""
-        return bool(self.distorts) or self.changes_start
 
     @property
     def variants(self) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects.effect import Addition, Effect
+from ..output_error import gauss_newton
 from ..output_error.continuation import FROM_MEASURED_MOTION, FROM_SIMULATION
 from ..output_error.gauss_newton import Fit, fit
 from ..output_error.problem import make_problem
@@ -24,10 +25,10 @@ LEADERS = 2
 SHORTLIST = 8
 """... of so many that the screening names first."""
 
-MOST_ITERATIONS = 10
+MOST_ITERATIONS = gauss_newton.MOST_ITERATIONS // 2
 """Of a fit that begins: an update's time is short, and the next one goes on from there."""
 
-ITERATIONS_ON = 5
+ITERATIONS_ON = gauss_newton.PATIENCE
 """Of a fit that goes on from the last update's: what has not settled then does so at the next one."""
 
 Key = tuple[str, str]

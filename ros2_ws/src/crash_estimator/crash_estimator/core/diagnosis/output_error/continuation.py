@@ -44,8 +44,5 @@ SMALL_STEPS: Schedule = (
 """Where that has led nowhere, as a light body between stiff elements may: the observer is let go in small steps, and
 less is believed at first, so that less is fitted to a motion that is still wrong."""
 
-LARGE_NOISE: Schedule = tuple(stage._replace(inflate=100.0 * stage.inflate) for stage in FROM_MEASURED_MOTION)
-"""Where not even that leads anywhere, as with a measured motion that errs by far."""
-
 SLOW_CONTACT: Schedule = tuple(Stage(0.0, 1.0, ramp) for ramp in np.repeat((8.0, 4.0, 2.0), 3))
 """Where a force that jumps at separation has stopped a fit short."""

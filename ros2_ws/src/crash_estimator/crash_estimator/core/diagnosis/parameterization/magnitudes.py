@@ -128,14 +128,9 @@ def attached_start(structure: Structure, record: ObservedRecord, addition) -> tu
     return float(x0), float(v0)
 
 
-def measure_magnitudes(
-    structure: Structure,
-    records: Sequence[ObservedRecord],
-    cells: int = CELLS,
-    motions: Sequence[Trajectory] | None = None,
-) -> Magnitudes:
-    """motions: where the measured accelerations are known to err, a better idea of how the bodies move."""
-    measured = tuple(motions or (measured_trajectory(structure, record) for record in records))
+def measure_magnitudes(structure: Structure, records: Sequence[ObservedRecord], cells: int = CELLS) -> Magnitudes:
+    """Along the measured motion; cells: of a curve."""
+    measured = tuple(measured_trajectory(structure, record) for record in records)
     outputs = outputs_of(structure)
     body_force = np.full(len(structure.bodies), np.inf)
     for k, body in enumerate(structure.bodies):

@@ -62,7 +62,7 @@ def _stands_still(evidence: Evidence) -> bool:
     as of a mimic, not at all, else not most of it; or it is of so little weight beside what one effect explains that it
     may be the form of that."""
     of_little_weight = evidence.by_first > THRESHOLDS.all_but_folds
-    little_of_it = not evidence.white and evidence.drift.share < THRESHOLDS.varying
+    little_of_it = not evidence.white and evidence.drift.share < THRESHOLDS.leading_share
     return of_little_weight or evidence.drift.constant or little_of_it
 
 

@@ -109,7 +109,7 @@ def _unexplained(evidence: Evidence, steps, first: Model, final: Model, floor: f
     )
     done = f"{names} {'explains' if len(steps) == 1 else 'explain'} part of it; " if steps else ""
     left = f"no candidate explains what is left, most of it in {where}"
-    also = f"; it goes along with {along}" if drift.share > THRESHOLDS.varying and not drift.constant else ""
+    also = f"; it goes along with {along}" if drift.share > THRESHOLDS.leading_share and not drift.constant else ""
     return f"{done}{size}; {left}{also}"
 
 

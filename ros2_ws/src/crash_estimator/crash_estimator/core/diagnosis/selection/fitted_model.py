@@ -7,7 +7,7 @@ import numpy as np
 
 from ...effects.effect import Addition
 from ..observation.record import ObservedRecord
-from ..output_error.continuation import LARGE_NOISE, SLOW_CONTACT, SMALL_STEPS, Schedule
+from ..output_error.continuation import SLOW_CONTACT, SMALL_STEPS, Schedule
 from ..output_error.gauss_newton import MOST_ITERATIONS, Fit, fit
 from ..output_error.problem import OutputErrorProblem, Point, make_problem
 from ..parameterization.free_curve import adapted_roughness
@@ -58,16 +58,6 @@ class Model(NamedTuple):
         found = fit(self.fit.problem, start, schedule, hopeless)
         return self._replace(fit=found, residuals=analyse(found, sharply=True))
 
-    def best_of(self, schedules: Sequence[Schedule], *others: "Model") -> "Model":
-        """The best of this fit, others of the same model, and those from the measured motion by other schedules."""
-        best = self
-        for other in others:
-            best = other if better(other, best) else best
-        for schedule in schedules:
-            other = self.refitted(schedule=schedule, hopeless=best.fit.cost)
-            best = other if better(other, best) else best
-        return best
-
 
 def fit_model(
     magnitudes: Magnitudes, records: Sequence[ObservedRecord], additions: Sequence[Addition],
@@ -97,26 +87,27 @@ def fit_model(
 
 
 def fit_given(magnitudes: Magnitudes, records: Sequence[ObservedRecord], additions: Sequence[Addition]) -> Model:
-    """The best of several fits, where not all is noise: of a fit that has stopped elsewhere than at the least, every
-    effect would seem to explain much."""
+    """The better of two fits, where not all is noise: of one that has stopped elsewhere than at the least, every effect
+    would seem to explain much."""
     model = fit_model(magnitudes, records, additions)
     if model.white:
         return model
     as_stated = fit(model.fit.problem.starting_as_stated(), hopeless=model.fit.cost)
-    return model.best_of((SMALL_STEPS, LARGE_NOISE), model.refitted(as_stated.point, hopeless=model.fit.cost))
+    other = model.refitted(as_stated.point, hopeless=model.fit.cost)
+    return other if better(other, model) else model
 
 
 def _with_more_care(problem: OutputErrorProblem, found: Fit, residuals: Residuals) -> tuple[Fit, Residuals]:
-    """Where a jump of a force may have stopped the fit short, or the motion has not settled: fitted on, or anew."""
+    """Fitted on, where a jump of a force may have stopped the fit short, or anew, where the motion has not settled."""
     if forces_jump(problem.layout) and not residuals.white:
         slower = fit(problem, found.point, SLOW_CONTACT, most=2 * MOST_ITERATIONS)
         if slower.evidence > found.evidence:
             found, residuals = slower, analyse(slower, sharply=True)
     if not settled(found, residuals):
-        for other in [fit(problem, schedule=schedule) for schedule in (SMALL_STEPS, LARGE_NOISE)]:
-            there = analyse(other, sharply=True)
-            if there.mean_square < residuals.mean_square:
-                found, residuals = other, there
+        anew = fit(problem, schedule=SMALL_STEPS)
+        there = analyse(anew, sharply=True)
+        if there.mean_square < residuals.mean_square:
+            found, residuals = anew, there
     return found, residuals
 
 
@@ -129,7 +120,7 @@ def _with_straight_curves(
     """
     lines = {link.name: np.array(STRAIGHT) for link in problem.layout.links if link.curve is not None}
     straight = make_problem(magnitudes, problem.records, additions, lines)
-    found = [fit(straight, schedule=schedule).point for schedule in ((), SMALL_STEPS, LARGE_NOISE)]
+    found = [fit(straight, schedule=schedule).point for schedule in ((), SMALL_STEPS)]
     found.append(straight.measured(straight.layout.start))
     held = [fit(problem, point, held=range(problem.layout.size)) for point in found]
     return min(((one, analyse(one, sharply=True)) for one in held), key=lambda found: found[1].mean_square)

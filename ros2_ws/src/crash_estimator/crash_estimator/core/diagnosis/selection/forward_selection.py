@@ -10,7 +10,7 @@ from .candidate_fits import CandidateFit
 from .even_fit import evenly_fitted
 from .fitted_model import Model
 from .pair_search import Pair, near_the_floor, two_at_once, two_of_one_effect
-from .pruning import up_to_the_least_error, without_the_superseded
+from .pruning import without_the_superseded
 from .rare_effects import common_effects, effects_beside, elsewhere_than, is_rare, with_rare_ones
 from .search_limit import search_is_over
 from .selection_step import SelectionStep, added, as_fitted, band_of_steps, in_recorded_noise, only_screened, weighed
@@ -33,9 +33,9 @@ def forward_selection(
     if not (first.leaves_noise or _explains_nearly_all(first) or search_is_over()):
         alike = two_of_one_effect(magnitudes, given, first.candidates)
         begun = near_the_floor(alike, first.candidates)
-    path, final = _from_two(effects, begun) if begun else _one_by_one(magnitudes, effects, given, [], first)
+    path, final = _from_two(magnitudes, effects, begun) if begun else _one_by_one(magnitudes, effects, given, [], first)
     if others := replaced(magnitudes, effects, given, path, final):
-        return _from_two(effects, others)
+        return _from_two(magnitudes, effects, others)
     next_to_nothing = begun or share_removed(given.residuals, final.residuals) > THRESHOLDS.all_but_folds
     if final.white or next_to_nothing or search_is_over():
         return path, final
@@ -43,16 +43,15 @@ def forward_selection(
     pair = two_at_once(magnitudes, effects, given, firsts, alike, _followed(path))
     if pair is None:
         return path, final
-    other = _from_two(effects, pair)
+    other = _from_two(magnitudes, effects, pair)
     if other[1].white:
         return other
-    paths = [up_to_the_least_error(*one) for one in (other, (path, final))]
-    return min(paths, key=lambda one: one[1].residuals.mean_square)
+    return min(other, (path, final), key=lambda one: one[1].residuals.mean_square)
 
 
-def _from_two(effects: Mapping[str, Effect], pair: Pair) -> tuple[list[SelectionStep], Model]:
+def _from_two(magnitudes: Magnitudes, effects: Mapping[str, Effect], pair: Pair) -> tuple[list[SelectionStep], Model]:
     """On from two that were found at once."""
-    return _one_by_one(pair.magnitudes, effects, pair.model, pair.path)
+    return _one_by_one(magnitudes, effects, pair.model, pair.path)
 
 
 def _one_by_one(
@@ -84,7 +83,7 @@ def _one_by_one(
         if done.best is None or done.best.gain < needed or len(path) > THRESHOLDS.few:
             # where the noise had to be taken larger, the model before the step is the one fitted with it
             return without_the_superseded(magnitudes, path, done.before)
-        magnitudes, larger = added(magnitudes, model, done.best)
+        larger = added(magnitudes, model, done.best)
         evenly = None if larger.white else evenly_fitted(as_fitted(done.before, done.best), band_of_steps(path), larger)
         if evenly and explains_too_little(done.sized, evenly, band_of_steps(path)):
             return path, done.before

@@ -12,12 +12,11 @@ from .acceptance import cost_of_noise, explains_too_little, share_removed
 from .candidate_fits import CandidateFit, fit_candidates
 from .fitted_model import Model, fit_model
 from .rare_effects import effects_beside
-from .selection_step import SelectionStep, added, as_fitted, on_trial
+from .selection_step import SelectionStep, added, as_fitted
 from .thresholds import THRESHOLDS
 
 
 class Pair(NamedTuple):
-    magnitudes: Magnitudes
     model: Model  # with both
     path: list[SelectionStep]  # as if they had been found one by one
 
@@ -68,7 +67,7 @@ def _together(
     rest = [one for one in candidates if one is not first]
     last = CandidateFit(second, gain, both.fit)
     path = [SelectionStep(model, [first, *rest], candidates), SelectionStep(larger, [last], [last])]
-    return Pair(magnitudes, both, path)
+    return Pair(both, path)
 
 
 def near_the_floor(pairs: Sequence[Pair], candidates: Sequence[CandidateFit]) -> Pair | None:
@@ -101,13 +100,13 @@ def _one_after_the_other(magnitudes: Magnitudes, effects, model: Model, candidat
     for first in _leading(model, candidates)[: THRESHOLDS.few]:
         if first.addition.key == followed or analyse(first.fit).mean_square >= THRESHOLDS.real_structure:
             continue
-        wider, larger = on_trial(magnitudes, model, first)
+        larger = as_fitted(model, first)
         beside = effects_beside([first.addition], magnitudes.structure, effects)
-        seconds = fit_candidates(wider, beside, larger, least=cost_of_noise(model.records))
+        seconds = fit_candidates(magnitudes, beside, larger, least=cost_of_noise(model.records))
         best = next(iter(likely(seconds)), None)
         if best is None:
             continue
-        widest, both = added(wider, larger, best)
+        both = added(magnitudes, larger, best)
         if both.white:
             others = [one for one in candidates if one is not first]
-            yield Pair(widest, both, [SelectionStep(model, [first, *others]), SelectionStep(larger, seconds)])
+            yield Pair(both, [SelectionStep(model, [first, *others]), SelectionStep(larger, seconds)])

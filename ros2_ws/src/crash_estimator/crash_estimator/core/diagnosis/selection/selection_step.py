@@ -9,13 +9,11 @@ import numpy as np
 from ...effects.effect import Addition, Effect
 from ..observation.noise_inflation import with_inflated_noise
 from ..observation.record import ObservedRecord
-from ..output_error.continuation import FROM_SIMULATION
 from ..output_error.gauss_newton import Fit, fit
 from ..output_error.normal_equations import may_diverge
-from ..parameterization.magnitudes import Magnitudes, measure_magnitudes
+from ..parameterization.magnitudes import Magnitudes
 from ..residuals.in_band import band_of
 from ..residuals.residuals import analyse
-from .acceptance import better
 from .candidate_fits import CandidateFit, fit_candidates, screen_candidates
 from .even_fit import evenly_fitted
 from .fitted_model import Model, fit_model
@@ -90,16 +88,12 @@ def weighed(
         if larger and _as_loud(noisier, done.before.records):
             break
         before = fit_model(magnitudes, noisier, model.additions)
-        problem = before.fit.problem
-        for start in [done.before.fit, *(one.fit for one in done.candidates[:1] if one.fit)]:
-            further = before.refitted(problem.narrowed(start.layout, start.point), FROM_SIMULATION)
-            before = further if better(further, before) else before
         if before.white:  # so it looks; the sensors' own noise decides
             decided = analyse(fit(model.fit.problem, before.fit.point), sharply=True).band_test
             before = before._replace(residuals=before.residuals._replace(band_test=decided))
         if fits:
-            # what has come up in a larger noise is gone on from in the next, but where a jump would hold it where it is
-            new = [o for o in done.candidates[:1] if o.addition.key not in fits and not o.addition.effect.profiled]
+            # what has come up in a larger noise is gone on from in the next
+            new = [o for o in done.candidates[:1] if o.addition.key not in fits]
             others = fit_candidates(magnitudes, effects, before, in_other_noise=[*new, *found])
         else:
             others = screen_candidates(magnitudes, effects, before)
@@ -137,29 +131,13 @@ def bounded(residuals: Sequence[np.ndarray], records: Sequence[ObservedRecord]) 
     return [r if np.nanstd(r) < np.nanstd(measured) else measured for r, measured in pairs]
 
 
-def added(magnitudes: Magnitudes, model: Model, best: CandidateFit) -> tuple[Magnitudes, Model]:
-    """The model with a candidate that was fitted, and the magnitudes that it then has."""
-    records, additions = model.records, [*model.additions, as_found(best)]
-    if not best.addition.effect.is_of_the_recording:
-        return magnitudes, fit_model(magnitudes, records, additions, best.fit.point)
-    # the measured motion was wrong, and with it the crushes that the curves reach over
-    mended = measure_magnitudes(magnitudes.structure, records, magnitudes.cells, best.fit.trajectories)
-    anew = fit_model(mended, records, additions)
-    if anew.white:
-        return mended, anew
-    on = fit_model(magnitudes, records, additions, best.fit.point)
-    return min((mended, anew), (magnitudes, on), key=lambda one: one[1].residuals.mean_square)
-
-
-def on_trial(magnitudes: Magnitudes, model: Model, first: CandidateFit) -> tuple[Magnitudes, Model]:
-    """With less care than `added`, to see what a second one gains beside it."""
-    if first.addition.effect.is_of_the_recording:
-        return added(magnitudes, model, first)
-    return magnitudes, as_fitted(model, first)
+def added(magnitudes: Magnitudes, model: Model, best: CandidateFit) -> Model:
+    """The model with a candidate that was fitted, with all care."""
+    return fit_model(magnitudes, model.records, [*model.additions, as_found(best)], best.fit.point)
 
 
 def as_fitted(model: Model, found: CandidateFit) -> Model:
-    """The model with a candidate as that was fitted to weigh it: not `added` with all care."""
+    """The model with a candidate as that was fitted to weigh it: with less care than `added`."""
     return Model((*model.additions, as_found(found)), found.fit, analyse(found.fit), model.roughness)
 
 
@@ -186,15 +164,8 @@ def band_of_steps(steps: Sequence[SelectionStep]) -> int | None:
 def fit_of_all(steps: Sequence[SelectionStep], final: Model) -> Fit:
     """The fit that coefficients are stated from; steps: those whose candidates were added, final: the model with all.
 
-    Where the noise had to be taken larger, it is the last addition's own fit that is honest: it has the others too.
+    The last model knows best; but where the noise had to be taken larger, it is the last addition's own fit that is
+    honest: it has the others too.
     """
-    return fit_stated(steps[-1], final) if steps else final.fit
-
-
-def fit_stated(step: SelectionStep, final: Model) -> Fit:
-    """The fit that a step's coefficient is stated from; final: the model with all that was added.
-
-    The last model knows best; but where the noise had to be taken larger, it is the step's own fit that is honest.
-    """
-    inflated = final.fit.problem.noise_is_inflated and step.before.fit.problem.noise_is_inflated
-    return step.candidates[0].fit if inflated else final.fit
+    inflated = steps and final.fit.problem.noise_is_inflated and steps[-1].before.fit.problem.noise_is_inflated
+    return steps[-1].candidates[0].fit if inflated else final.fit

@@ -12,7 +12,7 @@ from .fitted_model import Model, fit_model
 from .pair_search import Pair, likely
 from .rare_effects import effects_beside
 from .search_limit import search_is_over
-from .selection_step import SelectionStep, added, as_fitted, as_found, on_trial
+from .selection_step import SelectionStep, added, as_fitted, as_found
 from .thresholds import THRESHOLDS
 
 
@@ -40,17 +40,17 @@ def replaced(
     before, kept = two
     for _ in range(THRESHOLDS.few):
         first = alone(kept)
-        wider, larger = on_trial(magnitudes, given, first)
+        larger = as_fitted(given, first)
         beside = effects_beside([kept], magnitudes.structure, effects)
-        seconds = fit_candidates(wider, beside, larger, least=cost_of_noise(given.records))
+        seconds = fit_candidates(magnitudes, beside, larger, least=cost_of_noise(given.records))
         best = next(iter(likely(seconds)), None)
         if best is None or best.addition.key == before.key:
             return None
-        widest, both = added(wider, larger, best)
+        both = added(magnitudes, larger, best)
         if instead(both):
             other = alone(as_found(best))
             if other.gain > first.gain:  # what explains more comes first
-                turned = fit_model(widest, given.records, [*given.additions, other.addition, kept])
+                turned = fit_model(magnitudes, given.records, [*given.additions, other.addition, kept])
                 if instead(turned):
                     last = CandidateFit(kept, turned.fit.evidence - other.fit.evidence, turned.fit)
                     first, larger, both, seconds = other, as_fitted(given, other), turned, [last]
@@ -58,7 +58,7 @@ def replaced(
             rest = [
                 one for one in path[0].as_recorded if one.gain < first.gain and one.addition.key != first.addition.key
             ]
-            return Pair(widest, both, [SelectionStep(given, [first, *rest]), SelectionStep(larger, seconds)])
+            return Pair(both, [SelectionStep(given, [first, *rest]), SelectionStep(larger, seconds)])
         before, kept = kept, best.addition
     return None
 
