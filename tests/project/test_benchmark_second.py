@@ -21,7 +21,7 @@ def row(
 ) -> dict:
     return {
         "case": case, "right": expected, "gap": 0.0, "seen": 99.0, "target": "rib_spine",
-        "verdict": verdict, "seconds": 2.0,
+        "verdict": verdict, "seconds": 2.0, "iterations": 300 if verdict == "effect_missing" else 900,
         "ranking": [{"key": list(first), "rivals": more.pop("rivals", []), "shape": more.pop("shape", {})}],
         "steps": [{"key": list(first)}] if verdict == "effect_missing" else [],
     } | more  # fmt: skip
@@ -76,14 +76,17 @@ def test_page_counts_what_the_rows_say():
         row("side/nothing/1g/ringing/7", "adequate", expected=[]),
         row("side/outside.losing/1g/clean/8", first=("rate_hardening", "door_rib"), expected=[]),
         row("side/friction.dahl/1g/clipped/9", "adequate"),
+        row("side/friction.dahl/1g/clipped/11", "unexplained"),
         {"case": "wall/mass.rigid/1g/clean/10", "not_drawn": "not seen"},
     ]  # fmt: skip
-    text = page(rows, 6, "abc")
-    assert "5 cases judged of 6 planned, 1 could not be drawn; code abc" in text
+    text = page(rows, 7, "abc")
+    assert "6 cases judged of 7 planned, 1 could not be drawn; code abc" in text
     assert "| right effect and target first, 0.5 to 2 g, all forms | 95 % | 50 % (9 to 91) of 2 |" in text
     assert "| wrong without its rival named | at most 1 % | 50 % (9 to 91) of 2 |" in text
     assert "| `adequate` where nothing is hidden | 97 % | 100 % (21 to 100) of 1 |" in text
-    assert "| sensors in trouble: wrong `adequate` | none | 1/1 |" in text
+    assert "| sensors in trouble: wrong `adequate` | none | 1/2 |" in text
+    assert "of an answer, median |  | 300, most 300 |" in text
+    assert "| of `unexplained`, median: times as many | 3 | 3 |" in text
     assert "| `outside.losing` | 1/1 | 0/1 | 0/1 | 0/1 | rate_hardening on door_rib |" in text
     assert "0 cases judged" in page([], 0, "abc")
 

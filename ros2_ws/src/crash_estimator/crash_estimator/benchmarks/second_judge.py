@@ -9,13 +9,13 @@ from crash_replay.output import write_text
 from crash_replay.second_generator.cases import Case, CaseError, case_of, drawn
 from crash_replay.second_generator.plan import kind_of
 
-from ..core.diagnosis import ADEQUATE, EFFECT_MISSING, diagnose
+from ..core.diagnosis import ADEQUATE, EFFECT_MISSING, diagnose, iterations_made
 from ..model_file import load_model
 from .effects_judge import SAME_PLACE, answer, target_of
 
 
 def judge(case: Case) -> dict:
-    """A row of results: the case by its name, the right answers, what was found, and CPU seconds."""
+    """A row of results: the case by its name, the right answers, what was found, CPU seconds and iterations."""
     row: dict = {"case": case.name}
     try:
         it = drawn(case)
@@ -26,13 +26,14 @@ def judge(case: Case) -> dict:
         path = Path(folder) / f"{case.structure}.model.yaml"
         write_text(path, it.model_text)
         structure = load_model(path)
-    start = process_time()
+    start, made = process_time(), iterations_made()
     try:
         found = diagnose(structure, it.recordings)
     except (Fault, ArithmeticError, ValueError) as error:  # a failed answer, not a failed run
         wrong = {"verdict": "error", "error": f"{type(error).__name__}: {error}"}
-        return row | wrong | {"seconds": process_time() - start}
-    return row | {"seconds": process_time() - start, "complete": found.complete} | answer(found)
+        return row | wrong | {"seconds": process_time() - start, "iterations": iterations_made() - made}
+    took = {"seconds": process_time() - start, "iterations": iterations_made() - made}
+    return row | took | {"complete": found.complete} | answer(found)
 
 
 def leads(row: dict) -> bool:

@@ -85,6 +85,11 @@ def _asked(drawn: Sequence[Judged]) -> str:
     one, nothing, outside, trouble = (_of(drawn, kind) for kind in ("one", "nothing", "outside", "trouble"))
     seconds = [j.row["seconds"] for j in drawn]
     time = f"{median(seconds):.2g} s, the longest {max(seconds):.2g} s" if seconds else "-"
+    answers, unexplained = (
+        [j.row["iterations"] for j in drawn if j.row["verdict"] == word] for word in (EFFECT_MISSING, UNEXPLAINED)
+    )
+    of_answer = f"{median(answers):.0f}, most {max(answers)}" if answers else "-"
+    times = f"{median(unexplained) / median(answers):.2g}" if answers and unexplained else "-"
     rows = [
         ("right effect and target first, 0.5 to 2 g, all forms", "95 %", _share(one, right)),
         *((f"at {noise:g} g", "95 %", _share([j for j in one if j.case.noise == noise], right)) for noise in NOISES),
@@ -96,6 +101,8 @@ def _asked(drawn: Sequence[Judged]) -> str:
         ("sensors in trouble: right", "90 %", _share(trouble, right)),
         ("sensors in trouble: wrong `adequate`", "none", _share(trouble, is_verdict(ADEQUATE)).short),
         ("CPU time of a diagnosis, median", "1 s", time),
+        ("iterations of all fits, the same on every machine: of an answer, median", "", of_answer),
+        ("of `unexplained`, median: times as many", "3", times),
     ]
     return markdown_table(("", "asked", "reached (95 % interval)"), [(a, b, str(c)) for a, b, c in rows])
 

@@ -8,6 +8,7 @@ residuals, selection, report, online.
 from .online.candidate_turns import OnlineState
 from .online.online_answer import FitCurves, OnlineAnswer, final_answer
 from .online.online_diagnosis import OnlineDiagnosis
+from .output_error.gauss_newton import iterations_made
 from .report.another_recording import Predicted, predict
 from .report.diagnosis import Diagnosis, diagnose
 from .report.ranking import Ranked, StepReport
@@ -20,5 +21,5 @@ from .selection.thresholds import THRESHOLDS
 __all__ = [
     "ADEQUATE", "DEFAULT", "EFFECT_MISSING", "THRESHOLDS", "UNEXPLAINED", "Diagnosis", "FitCurves", "MisfitWindow",
     "Model", "OnlineAnswer", "OnlineDiagnosis", "OnlineState", "Predicted", "Ranked", "StepReport", "Tolerance",
-    "diagnose", "final_answer", "predict", "tolerance_of",
+    "diagnose", "final_answer", "iterations_made", "predict", "tolerance_of",
 ]  # fmt: skip
