@@ -59,13 +59,10 @@ def fit_candidates(
     if thorough:
         search.as_promised(by_motion)
     search.go_on_from([one for one in in_other_noise if one.fit][:short])
-    if thorough and model.residuals.mean_square < THRESHOLDS.near_floor:
+    nothing_left = model.white and earlier  # to stand for what was added, it would have had to explain all alone
+    if thorough and model.residuals.mean_square < THRESHOLDS.near_floor and not nothing_left:
         # such an error bends the motion that all curves are fitted to: no linearisation tells what it would gain
-        bend = [a for a in additions if _bends_driven_motion(magnitudes, a)]
-        if model.white:  # to stand for what was added, one would have had to explain all alone
-            tried = {one.addition.key for one in earlier if one.fit}
-            bend = [a for a in bend if a.key not in tried]
-        search.from_motion(Screened(a, 0.0, 0.0, 1.0) for a in bend)
+        search.from_motion(Screened(a, 0.0, 0.0, 1.0) for a in additions if _bends_driven_motion(magnitudes, a))
     if thorough and not model.white:
         ways = search.slowly, search.other_variants, search.anew
         of_little = ways if model.residuals.mean_square >= THRESHOLDS.real_structure else ways[:1]
