@@ -17,7 +17,7 @@ from crash_estimator.core.effects.effect import Addition
 MAGNITUDES = SimpleNamespace(structure=None)
 
 
-CARE = ["slowly", "other_variants", "anew"]
+CARE = ["slowly", "other_variants", "anew", "profile"]
 
 
 @pytest.mark.parametrize(
@@ -25,15 +25,15 @@ CARE = ["slowly", "other_variants", "anew"]
     [
         (False, True, (), 50.0, CARE),
         (False, False, (), 50.0, CARE[:1]),
-        (False, False, (), 150.0, CARE),
-        (True, False, (), 150.0, CARE),
+        (False, False, (), 150.0, CARE[:3]),
+        (True, False, (), 150.0, CARE[:3]),
         (True, True, (), 150.0, []),
         (True, False, ("one",), 150.0, []),
         (False, False, ("one",), 150.0, []),
         (False, True, ("one",), 50.0, CARE),
     ],
 )
-def test_care_is_taken_within_reach_of_noise_and_with_a_further_effect_where_most_is_explained(
+def test_care_is_taken_within_reach_of_noise_and_with_a_further_effect_or_a_profile_where_most_is_explained(
     monkeypatch, out_of_reach, explains_most, earlier, left, tried
 ):
     """And less of what explains less, but of a real structure."""
@@ -41,7 +41,7 @@ def test_care_is_taken_within_reach_of_noise_and_with_a_further_effect_where_mos
 
     class Search:
         def __init__(self, *given):
-            pass
+            self.profile = lambda: called.append("profile")
 
         def __getattr__(self, name):
             return lambda *given: called.append(name)

@@ -92,6 +92,7 @@ class Effect:
     replaces: ClassVar[str] = ""  # the element's key in a model file that it takes the place of
 
     # How a diagnosis searches for it
+    profiled: ClassVar[bool] = False  # its coefficient says when a force jumps to zero: the cost has a V over it
     restated: ClassVar[bool] = False  # the literature states the coefficient otherwise than it is fitted
 
     @property

@@ -1,1 +1,1 @@
-"""The output-error fit: sensitivity and normal equations, Gauss-Newton, continuation, Laplace evidence."""
+"""The output-error fit: sensitivity and normal equations, Gauss-Newton, continuation, Laplace evidence, profiles."""

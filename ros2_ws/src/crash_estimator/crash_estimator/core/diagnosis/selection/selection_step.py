@@ -92,8 +92,8 @@ def weighed(
             decided = analyse(fit(model.fit.problem, before.fit.point), sharply=True).band_test
             before = before._replace(residuals=before.residuals._replace(band_test=decided))
         if fits:
-            # what has come up in a larger noise is gone on from in the next
-            new = [o for o in done.candidates[:1] if o.addition.key not in fits]
+            # what has come up in a larger noise is gone on from in the next, but where a jump would hold it where it is
+            new = [o for o in done.candidates[:1] if o.addition.key not in fits and not o.addition.effect.profiled]
             others = fit_candidates(magnitudes, effects, before, in_other_noise=[*new, *found])
         else:
             others = screen_candidates(magnitudes, effects, before)

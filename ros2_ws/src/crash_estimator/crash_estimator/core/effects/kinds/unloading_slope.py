@@ -24,6 +24,7 @@ class UnloadingSlope(Effect):
     """The coefficient is the slope of the line on which the element unloads from its peak; no tension."""
 
     changes_law: ClassVar[bool] = True
+    profiled: ClassVar[bool] = True
     replaces: ClassVar[str] = "unloading"
 
     def put_to_work(self, structure, test, spec):
