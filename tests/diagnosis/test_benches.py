@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from crash_estimator.core.diagnosis import diagnose
+from crash_estimator.core.diagnosis.report import diagnosis
+from crash_estimator.core.diagnosis.report.verdict import Verdict
 from crash_estimator.core.structure import Body, Coefficient, Element, Structure
 from crash_replay.gravity import G
 from crash_replay.recording import Channel, Recording, Test
@@ -52,6 +54,14 @@ def test_friction_that_rises_with_the_rate_to_its_largest_is_a_damper(shape):
     assert dry[0] in ("coulomb_friction", "hysteresis") and dry[1] == pytest.approx(0.08, rel=0.25)
     told = [(one["element"], one["constant"], one["value"]) for one in found.as_json()["constants"]]
     assert told == ([("spring", "stiffness", pytest.approx(STIFFNESS, rel=0.01))] if shape == "constant" else [])
+
+
+def test_what_is_not_believed_of_two_effects_is_asked_of_the_first_alone(monkeypatch):
+    """What was added after it is no reason to doubt it."""
+    words = {0: "unexplained", 1: "effect_missing", 2: "unexplained"}
+    monkeypatch.setattr(diagnosis, "verdict_on", lambda evidence, tolerance: Verdict(words[evidence.added], False))
+    found = diagnose(undamped("constant"), [swing(friction=0.08)])
+    assert (found.verdict, len(found.steps), len(found.models)) == ("effect_missing", 1, 2)
 
 
 def test_a_free_curve_that_lacks_the_damping_of_a_long_swing_does_not_run_away():

@@ -1,6 +1,7 @@
 """A fit that has gone astray must not pass for what a model leaves; and what is told is what is applied."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,11 +10,17 @@ from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.output_error.continuation import FROM_SIMULATION
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 from crash_estimator.core.diagnosis.report.diagnosis import diagnose
+from crash_estimator.core.diagnosis.residuals.in_band import in_band
 from crash_estimator.core.diagnosis.residuals.residuals import analyse, free_run
+from crash_estimator.core.diagnosis.selection import pruning
 from crash_estimator.core.diagnosis.selection.acceptance import better
 from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
+from crash_estimator.core.diagnosis.selection.forward_selection import first_step, forward_selection
+from crash_estimator.core.diagnosis.selection.pruning import up_to_the_least_error
 from crash_estimator.core.diagnosis.selection.selection_step import (
+    band_of_steps,
     in_recorded_noise,
+    sized_models,
     weighed,
 )
 from crash_estimator.core.effects import EFFECTS
@@ -36,6 +43,13 @@ def fitted(*case):
     records = [observe(structure, recording)]
     magnitudes = measure_magnitudes(structure, records)
     return magnitudes, fit_model(magnitudes, records, ())
+
+
+@cache
+def searched():
+    """Steps and the last model of a case that the vocabulary cannot explain."""
+    magnitudes, given = fitted(*ROTATING_IMPACTOR)
+    return forward_selection(magnitudes, EFFECTS, given, first_step(magnitudes, EFFECTS, given))
 
 
 @pytest.mark.parametrize("from_on", [0, -50])
@@ -89,3 +103,28 @@ def test_the_structure_with_what_was_added_holds_the_coefficients_that_are_told(
     applied = found.structure.effects[len(structure.effects) :]
     told = [(step.effect, step.target, step.coefficient, step.shape) for step in found.steps]
     assert [(e.type, e.target, e.coefficient, dict(e.shape)) for e in applied] == told
+
+
+def test_steps_after_the_least_error_are_not_told(monkeypatch):
+    path, final = searched()
+    assert not final.white and len(final.additions) == 2
+    sizes = [in_band(one.fit, one.residuals, band_of_steps(path)).rms for one in sized_models(path, final)]
+    assert sizes[0] > sizes[1] > sizes[2]
+    assert up_to_the_least_error(path, final) == (path, final)
+    for errors, kept in (((3.0, 4.0, 3.5), 0), ((3.0, 2.0, 2.0), 1), ((3.0, 2.0, 1.0), 2), ((3.0, 4.0, 1.0), 2)):
+        told = iter(errors)
+        monkeypatch.setattr(pruning, "in_band", lambda fit, residuals, cfc, told=told: SimpleNamespace(rms=next(told)))
+        cut, last = up_to_the_least_error(path, final)
+        assert last is [path[0].before, path[1].before, final][kept]
+        assert cut == (path if kept == 2 else path[: kept + 1])
+
+
+def test_an_effect_that_is_found_to_be_nothing_is_not_told():
+    path, final = searched()
+    best, *others = path[1].candidates
+    term = best.fit.layout.term(best.addition)
+    theta = np.where(np.arange(len(best.fit.theta)) == term.coefficient, 0.0, best.fit.theta)
+    nothing = best._replace(fit=best.fit._replace(theta=theta))
+    told = [path[0], path[1]._replace(candidates=[nothing, *others]), *path[2:]]
+    cut, last = up_to_the_least_error(told, final)
+    assert last is told[1].before and cut == told[:2]

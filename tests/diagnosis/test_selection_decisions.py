@@ -85,6 +85,7 @@ def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypa
         "drift_of": lambda fit: SimpleNamespace(constant=True),
         "analyse": lambda fit: None,
         "_wants_finer_curves": lambda *given: wanted,
+        "up_to_the_least_error": lambda steps, final: (steps, final),
         "search_is_over": lambda: over,
     }
     for name, instead in made_up.items():

@@ -29,7 +29,7 @@ from .left import Left, left_by
 from .ranking import Ranked, StepReport, ranking_of, step_of
 from .time_zero_step import TIME_ZERO, as_ranked, signals_begin, time_zero_step
 from .tolerance import DEFAULT, Tolerance
-from .verdict import ADEQUATE, Evidence, verdict_on
+from .verdict import ADEQUATE, EFFECT_MISSING, UNEXPLAINED, Evidence, verdict_on
 from .verdict_text import verdict_text
 
 
@@ -149,6 +149,9 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
     of_all = fit_of_all(steps[: len(added)], path.final)
     reports = effects_added = tuple(step_of(*each, of_all) for each in list(pairs)[: len(added)])
     drift = _drift_left_by(path, final)
+    sure = next((k for k, one in enumerate(reports) if abs(one.coefficient) <= one.std), len(added))
+    if 0 < sure < len(added) and not (final.white and drift.constant):
+        return _answer(structure, up_to(path, sure), tolerance, zero)
     ranking, after = ranking_of(steps[0]), left_by(final, band)
     by_first = _explained_by_first_effect(models, added, band)
     if zero:
@@ -177,6 +180,10 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
     verdict = verdict_on(evidence, tolerance)
     if added and verdict.word == ADEQUATE:
         return _answer(structure, up_to(path, 0), tolerance, None)
+    if len(added) > 1 and verdict.word == UNEXPLAINED:
+        first = _answer(structure, up_to(path, 1), tolerance, zero)
+        if first.verdict == EFFECT_MISSING:  # what came after it is no reason to doubt it
+            return first
     floor = noise_floor(given.fit.layout, given.records)
     return Diagnosis(
         verdict=verdict.word,

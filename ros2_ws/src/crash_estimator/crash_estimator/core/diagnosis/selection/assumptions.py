@@ -23,6 +23,7 @@ from .contact_promise import likely_first, promised_by
 from .contacts import all_when_spent, elastic_when_spent, never_pulling
 from .fitted_model import Model, fit_given, fit_model
 from .forward_selection import first_step, forward_selection
+from .pruning import up_to_the_least_error
 from .rare_effects import found_as_common
 from .search_limit import search_is_over
 from .selection_path import SelectionPath, in_the_sensors_noise
@@ -166,6 +167,9 @@ def _with_curves_as_fine_as_needed(
         if finer_final.white and (fewer or (mimicked and drift_of(finer_final.fit).constant)):
             steps, final, cells = finer_steps, finer_final, finer.cells
             as_recorded = in_the_sensors_noise(sized_models(steps, final)[-1], records)
+    steps, reported = up_to_the_least_error(steps, final)
+    if reported is not final:
+        final, as_recorded = reported, in_the_sensors_noise(sized_models(steps, reported)[-1], records)
     return SelectionPath(structure, steps, final, as_recorded, records, cells)
 
 

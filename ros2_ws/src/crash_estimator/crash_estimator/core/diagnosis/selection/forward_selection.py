@@ -10,7 +10,7 @@ from .candidate_fits import CandidateFit
 from .even_fit import evenly_fitted
 from .fitted_model import Model
 from .pair_search import Pair, near_the_floor, two_at_once, two_of_one_effect
-from .pruning import without_the_superseded
+from .pruning import up_to_the_least_error, without_the_superseded
 from .rare_effects import common_effects, effects_beside, elsewhere_than, is_rare, with_rare_ones
 from .search_limit import search_is_over
 from .selection_step import SelectionStep, added, as_fitted, band_of_steps, in_recorded_noise, only_screened, weighed
@@ -46,7 +46,8 @@ def forward_selection(
     other = _from_two(magnitudes, effects, pair)
     if other[1].white:
         return other
-    return min(other, (path, final), key=lambda one: one[1].residuals.mean_square)
+    paths = [up_to_the_least_error(*one) for one in (other, (path, final))]
+    return min(paths, key=lambda one: one[1].residuals.mean_square)
 
 
 def _from_two(magnitudes: Magnitudes, effects: Mapping[str, Effect], pair: Pair) -> tuple[list[SelectionStep], Model]:

@@ -1,4 +1,4 @@
-"""Additions that go again, superseded by later ones."""
+"""Additions that go again: superseded by later ones, or no part of an explanation."""
 
 from collections.abc import Sequence
 
@@ -7,9 +7,10 @@ from ..output_error.continuation import SMALL_STEPS
 from ..output_error.gauss_newton import Fit, fit
 from ..output_error.problem import make_problem
 from ..parameterization.magnitudes import Magnitudes
+from ..residuals.in_band import in_band
 from ..residuals.residuals import analyse
 from .fitted_model import Model
-from .selection_step import SelectionStep
+from .selection_step import SelectionStep, band_of_steps, fit_stated, sized_models
 from .thresholds import THRESHOLDS
 
 
@@ -53,6 +54,28 @@ def _refitted(magnitudes: Magnitudes, additions: Sequence[Addition], like: Model
 def _again(step: SelectionStep, before: Model, gain: float | None) -> SelectionStep:
     best, *others = step.candidates
     return step._replace(before=before, candidates=[best if gain is None else best._replace(gain=gain), *others])
+
+
+def up_to_the_least_error(path: Sequence[SelectionStep], final: Model) -> tuple[list[SelectionStep], Model]:
+    """The steps, and the last model, up to the one that leaves the least, and while each addition is more than nothing.
+
+    What leaves white noise stands as it is. In a noise as large as the misfit a fit can end where the evidence is
+    better and the error is not: what comes after the least error is no part of an explanation.
+    """
+    if final.white:
+        return list(path), final
+    models = [step.before for step in path]
+    if models[-1] is not final:
+        models.append(final)
+    told = sized_models(path, final)[: 1 + len(final.found)]
+    errors = [in_band(one.fit, one.residuals, band_of_steps(path)).rms for one in told]
+    last = errors.index(min(errors))
+    last = next((k for k, step in enumerate(path[:last]) if _is_nothing(step, final)), last)
+    return (list(path[: last + 1]), models[last]) if last < len(errors) - 1 else (list(path), final)
+
+
+def _is_nothing(step: SelectionStep, final: Model) -> bool:
+    return _is_zero(step.candidates[0].addition, fit_stated(step, final))
 
 
 def _is_zero(addition: Addition, fitted: Fit) -> bool:

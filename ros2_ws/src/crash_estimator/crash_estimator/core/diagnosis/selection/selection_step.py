@@ -164,8 +164,15 @@ def band_of_steps(steps: Sequence[SelectionStep]) -> int | None:
 def fit_of_all(steps: Sequence[SelectionStep], final: Model) -> Fit:
     """The fit that coefficients are stated from; steps: those whose candidates were added, final: the model with all.
 
-    The last model knows best; but where the noise had to be taken larger, it is the last addition's own fit that is
-    honest: it has the others too.
+    Where the noise had to be taken larger, it is the last addition's own fit that is honest: it has the others too.
     """
-    inflated = steps and final.fit.problem.noise_is_inflated and steps[-1].before.fit.problem.noise_is_inflated
-    return steps[-1].candidates[0].fit if inflated else final.fit
+    return fit_stated(steps[-1], final) if steps else final.fit
+
+
+def fit_stated(step: SelectionStep, final: Model) -> Fit:
+    """The fit that a step's coefficient is stated from; final: the model with all that was added.
+
+    The last model knows best; but where the noise had to be taken larger, it is the step's own fit that is honest.
+    """
+    inflated = final.fit.problem.noise_is_inflated and step.before.fit.problem.noise_is_inflated
+    return step.candidates[0].fit if inflated else final.fit
