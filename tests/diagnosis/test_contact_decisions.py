@@ -98,6 +98,27 @@ def test_candidates_that_contacts_concern_are_asked_behind_those_that_they_do_no
     assert np.isfinite(contact_promise.promised_by("other", path, likely)) == promises
 
 
+def test_rare_candidates_that_leave_less_than_all_others_are_asked_first(monkeypatch):
+    """A damper that grows with the crush left a third of what the best common candidate did under a contact that does
+    not pull, and under the right one noise: without it two effects were told, neither of which is there."""
+    first = SimpleNamespace(
+        before=SimpleNamespace(additions=()),
+        doubted=[SimpleNamespace(addition="rare", fit="leaves less", gain=2e3)],
+        as_recorded=[SimpleNamespace(addition=name, fit=name, gain=1e3) for name in ("common", None)],
+    )  # fmt: skip
+    path = SimpleNamespace(
+        structure=None,
+        records=(),
+        cells=36,
+        steps=[first],
+        final=model(white=False),
+        furthest=SimpleNamespace(cost=0.0),
+    )
+    monkeypatch.setattr(contact_promise, "measure_magnitudes", lambda *given: None)
+    monkeypatch.setattr(contact_promise, "_in_other_forms", lambda addition: ())
+    assert [*contact_promise.likely_first(path)] == [(("rare",), "leaves less"), (("common",), "common")]
+
+
 def with_fits(monkeypatch, evidence):
     """All models are fitted with as much evidence under other contacts."""
     otherwise = SimpleNamespace(evidence=evidence)

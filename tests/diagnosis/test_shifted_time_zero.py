@@ -202,6 +202,36 @@ def test_where_bodies_touch_is_asked_where_something_is_left(monkeypatch, found,
     assert onset_search._Search(None, (), {})._may_begin_elsewhere(found, ()) == asked
 
 
+@pytest.mark.parametrize(("left_with", "stated", "asked"), [
+    ({"given": 1.5}, 30.0, True),
+    ({"given": 9.0, "found": 1.5}, 30.0, True),
+    ({"given": 9.0, "found": 5.0, "likely": 1.5}, 30.0, True),
+    ({"given": 9.0, "found": 5.0, "likely": 3.0}, 30.0, False),  # less, but no noise
+    ({"given": 9.0, "found": 5.0, "likely": 3.0}, 300.0, True),  # next to nothing of so much more
+])  # fmt: skip
+def test_all_is_searched_with_the_touch_open_only_where_a_likely_fit_is_explained_by_it(
+    monkeypatch, left_with, stated, asked
+):
+    """Such a search took a sixth of the iterations of what nothing explains. In times the cost of noise, of 100."""
+    search = onset_search._Search
+    monkeypatch.setattr(search, "coasting_records", ())
+    monkeypatch.setattr(onset_search, "cost_of_noise", lambda records: 100.0)
+    monkeypatch.setattr(onset_search, "measure_magnitudes", lambda *given: None)
+    monkeypatch.setattr(onset_search, "make_problem", lambda magnitudes, records, additions: additions)
+    monkeypatch.setattr(
+        onset_search, "fit", lambda additions, hopeless: SimpleNamespace(cost=100.0 * left_with[additions[-1]])
+    )
+    found = SimpleNamespace(
+        structure=None, cells=36, as_recorded=SimpleNamespace(cost=100.0 * stated),
+        final=SimpleNamespace(additions=("given", "found")),
+        steps=[SimpleNamespace(
+            before=SimpleNamespace(additions=("given",)),
+            as_recorded=[SimpleNamespace(addition="likely", fit=True), SimpleNamespace(addition="screened", fit=None)],
+        )],
+    )  # fmt: skip
+    assert search(None, (), {})._explained_by_the_touch(found) == asked
+
+
 @pytest.mark.parametrize(("gain", "seconds", "told"), [(50.0, -4e-3, True), (-19.0, -4e-3, False), (50.0, 5e-4, False)])
 def test_a_time_zero_that_is_not_sure_or_from_which_no_less_is_left_is_not_told(monkeypatch, gain, seconds, told):
     """An axis that lacks nothing was told one with -19 nats, a car one by which its error grew fourfold: with less of

@@ -67,17 +67,19 @@ def _fitted_slowly(
 
 def likely_first(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]]:
     """The best first candidates, as another than the right one may have come first, in all their forms; where one
-    leaves noise, those that explain nearly as much."""
+    leaves noise, those that explain nearly as much. Rare ones that leave less than all others, though not noise, as
+    they may under contacts that are not so, are the first of them."""
     first = path.steps[0]
     magnitudes = measure_magnitudes(path.structure, path.records, path.cells)
-    fitted = [one for one in first.as_recorded if one.fit]
+    fitted = [*first.doubted, *(one for one in first.as_recorded if one.fit)]
     if path.final.white:
         fitted = [one for one in fitted if one.gain > (1.0 - THRESHOLDS.least_share) * fitted[0].gain]
+    hopeless = path.furthest.cost + THRESHOLDS.hopeless
     for one in fitted:  # from where it began: what it has come to may be what made up for the contact
         yield (*first.before.additions, one.addition), one.fit
         for other in _in_other_forms(one.addition):
             additions = (*first.before.additions, other)
-            yield additions, fit(make_problem(magnitudes, path.records, additions))
+            yield additions, fit(make_problem(magnitudes, path.records, additions), hopeless=hopeless)
 
 
 def _in_other_forms(addition: Addition) -> Iterator[Addition]:

@@ -39,7 +39,7 @@ def forward_selection(
     next_to_nothing = begun or share_removed(given.residuals, final.residuals) > THRESHOLDS.all_but_folds
     if final.white or next_to_nothing or search_is_over():
         return path, final
-    firsts = [*first.doubted, *first.as_recorded]
+    firsts = [*first.doubted[:1], *first.as_recorded]
     pair = two_at_once(magnitudes, effects, given, firsts, alike, _followed(path))
     if pair is None:
         return path, final

@@ -68,11 +68,11 @@ def with_rare_ones(
         return elsewhere_than(found, SelectionStep(model, fits))
 
     alone = fitted()
-    leaves_less = any(one.fit and one.fit.cost < least for one in alone.candidates)
-    if leaves_less and not (step.leaves_noise or alone.leaves_noise):
+    if _leaving_less(alone, least) and not (step.leaves_noise or alone.leaves_noise):
         alone = fitted(thorough=True)
     if not (alone.leaves_noise or (_leaves_next_to_nothing(alone) and not _comes_near(step, alone))):
-        return step._replace(doubted=alone.candidates[:1]) if leaves_less and not step.leaves_noise else step
+        doubted = [] if step.leaves_noise else _leaving_less(alone, least)
+        return step._replace(doubted=doubted) if doubted else step
     best: dict[tuple[str, str], CandidateFit] = {}
     for one in sorted([*step.candidates, *alone.candidates], key=_rank):
         best.setdefault(one.addition.key, one)
@@ -85,6 +85,11 @@ def elsewhere_than(found: Iterable[Addition], step: SelectionStep) -> SelectionS
     other leaves."""
     taken = {addition.target for addition in found}
     return step._replace(candidates=[one for one in step.candidates if one.addition.target not in taken])
+
+
+def _leaving_less(step: SelectionStep, cost: float) -> list[CandidateFit]:
+    """The candidates that do, than what has that cost."""
+    return [one for one in step.candidates if one.fit and one.fit.cost < cost]
 
 
 def _leaves_next_to_nothing(step: SelectionStep) -> bool:

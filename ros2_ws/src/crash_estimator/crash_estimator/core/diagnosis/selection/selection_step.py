@@ -28,7 +28,7 @@ class SelectionStep(NamedTuple):
     candidates: list[CandidateFit]
     as_recorded: Sequence[CandidateFit] = ()  # in the sensors' noise, where `candidates` are in a larger one
     evenly: Model | None = None  # the model before it as its size is told, where noise was taken larger
-    doubted: Sequence[CandidateFit] = ()  # fitted, and not believed: a rare one alone, or any beside those found
+    doubted: Sequence[CandidateFit] = ()  # fitted, not believed: rare ones that leave less, or any beside those found
 
     @property
     def sized(self) -> Model:
