@@ -206,6 +206,7 @@ def test_where_bodies_touch_is_asked_where_something_is_left(monkeypatch, found,
     ({"given": 1.5}, 30.0, True),
     ({"given": 9.0, "found": 1.5}, 30.0, True),
     ({"given": 9.0, "found": 5.0, "likely": 1.5}, 30.0, True),
+    ({"given": 9.0, "found": 5.0, "likely": 3.0, "rare": 1.5}, 30.0, True),
     ({"given": 9.0, "found": 5.0, "likely": 3.0}, 30.0, False),  # less, but no noise
     ({"given": 9.0, "found": 5.0, "likely": 3.0}, 300.0, True),  # next to nothing of so much more
 ])  # fmt: skip
@@ -219,7 +220,7 @@ def test_all_is_searched_with_the_touch_open_only_where_a_likely_fit_is_explaine
     monkeypatch.setattr(onset_search, "measure_magnitudes", lambda *given: None)
     monkeypatch.setattr(onset_search, "make_problem", lambda magnitudes, records, additions: additions)
     monkeypatch.setattr(
-        onset_search, "fit", lambda additions, hopeless: SimpleNamespace(cost=100.0 * left_with[additions[-1]])
+        onset_search, "fit", lambda added, hopeless: SimpleNamespace(cost=100.0 * left_with.get(added[-1], 9.0))
     )
     found = SimpleNamespace(
         structure=None, cells=36, as_recorded=SimpleNamespace(cost=100.0 * stated),
@@ -227,6 +228,7 @@ def test_all_is_searched_with_the_touch_open_only_where_a_likely_fit_is_explaine
         steps=[SimpleNamespace(
             before=SimpleNamespace(additions=("given",)),
             as_recorded=[SimpleNamespace(addition="likely", fit=True), SimpleNamespace(addition="screened", fit=None)],
+            doubted=[SimpleNamespace(addition="rare", fit=True)],
         )],
     )  # fmt: skip
     assert search(None, (), {})._explained_by_the_touch(found) == asked

@@ -65,10 +65,12 @@ class _Search:
         elsewhere = tuple(shift for shift in self.begins if shift.differs)
         early = tuple(shift for shift in elsewhere if shift.off(0.0) > 0.0)
         zero = touched = None
+        searched = False  # all of it, while it is open when bodies touch
         if any(shift.off(0.0) for shift in elsewhere):
             magnitudes, given = as_given(self.structure, self.as_stated, self.effects)
             zero = self._begins_early(given, early) if early else None
-            if not given.white and len(self.in_doubt.added) <= 1 and _leaves_about_noise(self.in_doubt):
+            searched = not given.white
+            if searched and len(self.in_doubt.added) <= 1 and _leaves_about_noise(self.in_doubt):
                 if zero or not first_step(magnitudes, self.effects, given).leaves_noise:
                     touched = self._from_the_touch(given)
             if touched and (touched.path.noise or search_is_over()):
@@ -76,7 +78,7 @@ class _Search:
         found = self._stated_or_early(zero, elsewhere)
         settled = touched or found.taken or search_is_over()
         if not settled and self._may_begin_elsewhere(found.path, elsewhere):
-            if self._explained_by_the_touch(found.path) and _better(self.in_doubt, found.path):
+            if (searched or self._explained_by_the_touch(found.path)) and _better(self.in_doubt, found.path):
                 touched = self._from_the_touch(zero.as_stated if zero else found.path.steps[0].before)
         return touched if touched and _better(touched.path, found.path) else found
 
@@ -144,9 +146,10 @@ class _Search:
         by the model as given, by what was found, or with one of the best first candidates. Of 14 looked-at searches the
         three that were right were of such."""
         first = path.steps[0]
-        likely = [one.addition for one in first.as_recorded if one.fit][: THRESHOLDS.shortlist]
+        fitted = [one for one in first.as_recorded if one.fit][: THRESHOLDS.shortlist]
         given = first.before.additions
-        models = (given, path.final.additions, *((*given, one) for one in likely))
+        likely = ((*given, one.addition) for one in (*fitted, *first.doubted[: THRESHOLDS.few]))
+        models = (given, path.final.additions, *likely)
         magnitudes = measure_magnitudes(path.structure, self.coasting_records, path.cells)
         next_to_nothing = (1.0 - THRESHOLDS.all_but_folds) * path.as_recorded.cost
         most = max(THRESHOLDS.near_floor * cost_of_noise(self.coasting_records), next_to_nothing)
