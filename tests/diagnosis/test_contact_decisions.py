@@ -99,8 +99,8 @@ def test_candidates_that_contacts_concern_are_asked_behind_those_that_they_do_no
 
 
 def test_rare_candidates_that_leave_less_than_all_others_are_asked_first(monkeypatch):
-    """A damper that grows with the crush left a third of what the best common candidate did under a contact that does
-    not pull, and under the right one noise: without it two effects were told, neither of which is there."""
+    """A damper that grows with the crush left less than half of what the best common candidate did under a contact that
+    may pull, and under the right one noise: without it two effects were told, neither of which is there."""
     first = SimpleNamespace(
         before=SimpleNamespace(additions=()),
         doubted=[SimpleNamespace(addition="rare", fit="leaves less", gain=2e3)],

@@ -13,9 +13,11 @@ from crash_estimator.core.diagnosis.output_error.problem import make_problem
 from crash_estimator.core.diagnosis.output_error.profile_likelihood import STEP, closer, profile
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 from crash_estimator.core.diagnosis.report.diagnosis import diagnose
+from crash_estimator.core.diagnosis.selection import candidate_fits
 from crash_estimator.core.diagnosis.selection.candidates import candidates
 from crash_estimator.core.diagnosis.selection.fitted_model import fit_model
 from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.effects.effect import Addition
 from crash_estimator.core.effects.kinds.body_inertia import LEFT_OUT, WEIGHED
 from crash_estimator.model_file import ModelFile
 from crash_replay.synthetic.hidden.cases import draw_case
@@ -43,6 +45,34 @@ def test_the_look_at_a_profile_goes_on_beyond_the_largest_start_as_long_as_the_c
     found = profile(problem, None, [1.0])
     assert abs(found.at - least) <= STEP / 2.0
     assert found.fit.cost == pytest.approx(abs(found.at - least))
+
+
+@pytest.mark.parametrize(("leads", "on", "looked_at"), [
+    ("hysteresis", "front", True),
+    ("hysteresis", "rear", False),
+    ("rate_hardening", "front", False),
+])  # fmt: skip
+def test_a_profile_is_looked_at_where_a_force_that_remembers_leads_on_the_same_element(
+    monkeypatch, leads, on, looked_at
+):
+    """What unloads on a slope of its own is followed by such a force first; elsewhere the look takes 240 iterations."""
+    asked = []
+
+    def look(problem, addition, starts):
+        asked.append(starts)
+        return SimpleNamespace(fit=SimpleNamespace(cost=1e3), addition=addition)
+
+    slope = Addition(EFFECTS["plastic_unloading"], "front", coefficient=1e6)
+    screened = [SimpleNamespace(addition=slope, gain=1.0)]
+    model = SimpleNamespace(fit=SimpleNamespace(cost=1e3), white=False)
+    search = candidate_fits._Search(None, model, screened)
+    best = Addition(EFFECTS[leads], on)
+    search.found[best.key] = candidate_fits.CandidateFit(best, 100.0, SimpleNamespace(cost=500.0))
+    search.least = 500.0
+    monkeypatch.setattr(candidate_fits._Search, "_problem", lambda self, addition: None)
+    monkeypatch.setattr(candidate_fits, "profile", look)
+    search.profile()
+    assert asked == ([[1e6]] if looked_at else [])
 
 
 @pytest.mark.parametrize(("seed", "noise"), [(420018, 0.5), (420001, 2.0)])

@@ -143,7 +143,7 @@ class _Search:
 
     def _explained_by_the_touch(self, path: SelectionPath) -> bool:
         """Whether about noise is left, or next to nothing of what is left so far, while it is open when bodies touch,
-        by the model as given, by what was found, or with one of the best first candidates. Of 14 looked-at searches the
+        by the model as given, by what was found, or with one of the best first candidates. Of 15 looked-at searches the
         three that were right were of such."""
         first = path.steps[0]
         fitted = [one for one in first.as_recorded if one.fit][: THRESHOLDS.shortlist]
