@@ -69,13 +69,13 @@ def test_what_is_likely_is_fitted_once_whatever_contacts_are_asked_of_it(monkeyp
     form = SimpleNamespace(key=("stop", "spring"), variant="in_curve")
     best = candidate(900.0, ("stop", "spring"))
     best.addition.variant = ""
-    first = SimpleNamespace(as_recorded=[best], before=SimpleNamespace(additions=()), best=None)
-    final = SimpleNamespace(white=False, fit=SimpleNamespace(evidence=0.0))
+    first = SimpleNamespace(as_recorded=[best], doubted=[], before=SimpleNamespace(additions=()), best=None)
+    final = SimpleNamespace(white=False, fit=SimpleNamespace(evidence=0.0, cost=1000.0))
     path = assumptions.SelectionPath("stated", [first], final, final.fit, (), 36)
     monkeypatch.setattr(contact_promise, "measure_magnitudes", lambda *given: None)
     monkeypatch.setattr(contact_promise, "make_problem", lambda *given: None)
     monkeypatch.setattr(contact_promise, "_in_other_forms", lambda addition: [form])
-    monkeypatch.setattr(contact_promise, "fit", lambda problem: fits.append(problem))
+    monkeypatch.setattr(contact_promise, "fit", lambda problem, hopeless: fits.append(hopeless))
     for name in ("never_pulling", "elastic_when_spent", "all_when_spent"):
         monkeypatch.setattr(assumptions, name, lambda structure, name=name: name)
 
@@ -87,4 +87,5 @@ def test_what_is_likely_is_fitted_once_whatever_contacts_are_asked_of_it(monkeyp
     monkeypatch.setattr(assumptions, "search_is_over", lambda: False)
     monkeypatch.setattr(assumptions, "_as_exact_as_needed", lambda *given: path)
     assert assumptions._selected("stated", (), {}) is path
-    assert seen == [["", "in_curve"]] * 3 and len(fits) == 1
+    assert seen == [["", "in_curve"]] * 3
+    assert fits == [1000.0 + THRESHOLDS.hopeless], "and not to the end, far above what was found"
