@@ -18,6 +18,7 @@ from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.fold import run
 from crash_estimator.core.methods import make_estimator
 from crash_estimator.model_file import ModelFile, load_model
+from crash_replay.second_generator import cases as second_generator
 from crash_replay.synthetic.hidden.cases import draw_case
 from crash_replay.synthetic.hidden.laws import Carrier
 
@@ -72,6 +73,17 @@ def test_what_is_missing_is_found_alone_either_way(law):
     (step,) = found.steps
     assert found.verdict == "effect_missing" and (step.effect, step.target) == (hidden.effect, hidden.target)
     assert abs(step.coefficient - hidden.coefficient) < 3.0 * step.std
+
+
+def test_a_rare_form_is_named_under_a_contact_that_the_model_states_otherwise():
+    """A damper that grows with the crush, of a contact that never pulls: with one that may, it leaves three times the
+    noise, and what leaves less than the common candidates was not asked under other contacts."""
+    case = second_generator.drawn(second_generator.case_of("wall/damper.deepening/1g/clean/36000038"))
+    structure = ModelFile.model_validate(yaml.safe_load(case.model_text)).structure()
+    found = diagnose(structure, case.recordings)
+    (step,) = found.steps
+    assert (found.verdict, step.effect, step.target) == ("effect_missing", "viscous_damping", "car_barrier")
+    assert step.form == "hunt_crossley" and "never pull" in found.text
 
 
 def test_the_two_ways_differ_by_far_more_than_noise():

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import yaml
 from scipy.integrate import solve_ivp
 
 from crash_estimator.benchmarks.effects_judge import drawn as drawn_case
@@ -25,7 +24,6 @@ from crash_estimator.core.effects.effect import Addition
 from crash_estimator.core.structure import EffectSpec
 from crash_estimator.model_file import ModelFile
 from crash_replay.recording import Channel, Recording, Test
-from crash_replay.second_generator import cases as second_generator
 from crash_replay.synthetic.hidden.cases import draw_case
 
 THAT_REMEMBER = {"maxwell_element", "gas_cushion"}
@@ -108,17 +106,6 @@ def named(name: str) -> list[tuple[str, str]]:
 def test_a_rare_effect_is_named_where_the_best_common_one_leaves_four_times_as_much(name, element):
     """Rate hardening leaves 1.4 and 1.5 of the noise, what relaxes 1.04 and, with contacts as they are, noise."""
     assert named(name) == [("maxwell_element", element)]
-
-
-def test_a_rare_form_is_named_under_a_contact_that_the_model_states_otherwise():
-    """A damper that grows with the crush, of a contact that never pulls: with one that may, it leaves three times the
-    noise, and what leaves less than the common candidates was not asked under other contacts."""
-    case = second_generator.drawn(second_generator.case_of("wall/damper.deepening/1g/clean/36000038"))
-    structure = ModelFile.model_validate(yaml.safe_load(case.model_text)).structure()
-    found = diagnose(structure, case.recordings)
-    (step,) = found.steps
-    assert (found.verdict, step.effect, step.target) == ("effect_missing", "viscous_damping", "car_barrier")
-    assert step.form == "hunt_crossley" and "never pull" in found.text
 
 
 def test_a_rare_effect_that_leaves_less_than_all_common_ones_leads_to_a_pair():
