@@ -32,22 +32,28 @@ class Listening:
         """wait_for: estimators to hear before the samples; hear: called with each message, serialized; more_to_come:
         whether a topic is known of that has not been found yet."""
         self.node, self.choice, self.wait_for, self.hear, self.more_to_come = node, choice, wait_for, hear, more_to_come
-        self.heard: dict[str, Heard] = {}  # by name
+        self.found: set[str] = set()  # names of topics that are wanted and said by somebody
+        self.heard: dict[str, Heard] = {}  # by name; the samples are found first and heard last
         self.newest = 0.0  # monotonic s, when a topic was found
         self.looked = time.monotonic()
 
     def look(self) -> list[Heard]:
-        """What has been found since the last look; a replay that waits for this node begins when all is heard."""
-        now, found = time.monotonic(), list[Heard]()
+        """What is heard since this look; a replay that waits for this node begins when all is heard."""
+        now, heard = time.monotonic(), list[Heard]()
         self.newest += max(0.0, now - self.looked - SETTLED / 2)  # while this process stands still it finds nothing
         self.looked = now
-        for name, (kind, *_) in self.node.get_topic_names_and_types():
+        for name, (kind, *_) in sorted(self.node.get_topic_names_and_types(), key=_samples_last):
             if name in self.heard or not self.choice.wants(name, kind) or not self.node.count_publishers(name):
                 continue
             own = is_own(self.node, name)
-            if self.choice.wants(name, kind, own) and (kind != SAMPLES or self.settled()):
-                found.append(self._subscribe(name, kind, own))
-        return found
+            if not self.choice.wants(name, kind, own):
+                continue
+            if name not in self.found:  # a replay's other topics may be found in any order, and later
+                self.found.add(name)
+                self.newest = time.monotonic()
+            if kind != SAMPLES or self.settled():
+                heard.append(self._subscribe(name, kind, own))
+        return heard
 
     def settled(self) -> bool:
         estimators = sum(topic.type == PARAMETERS and topic.own for topic in self.heard.values())
@@ -67,7 +73,6 @@ class Listening:
     def _subscribe(self, name: str, kind: str, own: bool) -> Heard:
         qos = self._qos(name)
         topic = self.heard[name] = Heard(name, kind, qos is EVERY_SAMPLE_SAID, own)
-        self.newest = time.monotonic()
         package, _, message = kind.split("/")
         message_type = getattr(import_module(f"{package}.msg"), message)
         heard: Any = partial(self.hear, topic)  # raw: it is given bytes, of which rclpy's types know nothing
@@ -79,3 +84,7 @@ class Listening:
         """What was said before this node came is heard where it is kept."""
         offered = [info.qos_profile.durability for info in self.node.get_publishers_info_by_topic(topic)]
         return EVERY_SAMPLE_SAID if set(offered) == {DurabilityPolicy.TRANSIENT_LOCAL} else EVERY_SAMPLE
+
+
+def _samples_last(topic: tuple[str, list[str]]) -> bool:
+    return SAMPLES in topic[1]
