@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects.effect import Addition
-from .continuation import SLOW_CONTACT, SMALL_STEPS
+from .continuation import SLOW_CONTACT, SMALL_STEPS, Schedule
 from .gauss_newton import Fit, fit
 from .problem import OutputErrorProblem, Point
 
 STEP = 0.5
-"""Of the constant's logarithm: a coarse look, a step beyond where the search starts on either side."""
+"""Of the constant's logarithm, in the coarse look."""
 
 PRECISION = 1e-3
 """Of the logarithm: a thousandth of the slope; not varied."""
@@ -33,8 +33,11 @@ class Profile(NamedTuple):
     fit: Fit  # there
 
 
-def profile(problem: OutputErrorProblem, addition: Addition, starts: Sequence[float]) -> Profile:
-    """starts: of the coefficient; the look goes on beyond the largest as long as the cost falls."""
+def profile(
+    problem: OutputErrorProblem, addition: Addition, starts: Sequence[float], schedule: Schedule = SMALL_STEPS,
+    hopeless: float = np.inf,
+) -> Profile:  # fmt: skip
+    """starts: of the coefficient; from the best of them on as long as the cost falls. schedule, hopeless: as `fit`."""
     layout = problem.layout
     coefficient = layout.term(addition).coefficient
     tried: dict[float, Fit] = {}
@@ -42,14 +45,15 @@ def profile(problem: OutputErrorProblem, addition: Addition, starts: Sequence[fl
     def cost(logarithm: float) -> float:
         start = layout.start.copy()
         start[coefficient] = np.exp(logarithm)
-        tried[logarithm] = fit(problem.starting_at(start), schedule=SMALL_STEPS, held=(coefficient,))
+        tried[logarithm] = fit(problem.starting_at(start), None, schedule, hopeless, held=(coefficient,))
         return tried[logarithm].cost
 
-    lowest = np.log(layout.prior.low[coefficient])
-    low, high = max(np.log(min(starts)) - STEP, lowest), np.log(max(starts)) + STEP
-    best = min(np.linspace(low, high, 1 + int(np.ceil((high - low) / STEP))), key=cost)
-    while best == max(tried) and cost(best + STEP) < tried[best].cost:
-        best = max(tried)
+    lowest = float(np.log(layout.prior.low[coefficient]))
+    best = first = min(np.log(starts), key=cost)
+    for step in (STEP, -STEP):
+        if best == first:
+            while (beyond := max(best + step, lowest)) not in tried and cost(beyond) < tried[best].cost:
+                best = beyond
     return Profile(addition, problem, coefficient, lowest, best, tried[best])
 
 

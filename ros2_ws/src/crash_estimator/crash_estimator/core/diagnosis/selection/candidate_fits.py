@@ -66,8 +66,8 @@ def fit_candidates(
         search.from_motion(Screened(a, 0.0, 0.0, 1.0) for a in additions if _bends_driven_motion(magnitudes, a))
     if thorough and not model.white:
         ways = search.slowly, search.other_variants, search.anew, search.profile
-        # of what explains little in the sensors' noise, far above it, all but the profile over its instant
-        of_little = ways[: 3 if model.residuals.mean_square >= THRESHOLDS.real_structure else 1]
+        # what explains little of less than a real structure leaves is fitted neither in other ways nor anew
+        of_little = ways if model.residuals.mean_square >= THRESHOLDS.real_structure else (ways[0], ways[-1])
         for harder in ways:
             if search_is_over() or search.reached_the_floor():
                 break
@@ -75,7 +75,7 @@ def fit_candidates(
                 if search.out_of_reach():
                     break
             elif earlier or harder not in of_little:
-                break
+                continue
             harder()
     if thorough and not search_is_over() and search.reached_the_floor():
         search.hardly_screened()
@@ -154,20 +154,22 @@ class _Search:
             self._fit(one.addition, None, SMALL_STEPS)
 
     def profile(self) -> None:
-        """Fit the likeliest that has a constant which says when its force ends, over that; closer, where it comes near
-        the best one.
-
-        Where that is missing, a force that remembers explains most already, on its target. Of 239 looked-at searches it
-        changed none; of bags/frontal_single and the model that lacks its unloading line nothing else leaves noise.
-        """
-        additions = [one.addition for one in self.ranking()]
-        best, likeliest = additions[0], next((one for one in additions if one.effect.profiled), None)
-        if not (likeliest and best.effect.remembers and best.target == likeliest.target):
+        """Fit one that has a constant which says when its force ends, over that: on the target of the best one, with
+        care where that remembers, as such forces follow it first; or the likeliest. Closer, where it takes away about
+        as much as the best one. Of 32 looked-at side impacts that lack such a constant 30 are told right; 28 where a
+        profile was looked at only behind a force that remembers."""
+        best, profiled = self.ranking()[0].addition, [o.addition for o in self.ranking() if o.addition.effect.profiled]
+        if not profiled:
             return
-        starts = [one.addition for one in self.screened if one.addition.key == likeliest.key]
-        look = profile(self._problem(starts[0]), starts[0], [addition.coefficient for addition in starts])
-        taken_away = self.model.fit.cost - look.fit.cost
-        if taken_away > THRESHOLDS.named_share * (self.model.fit.cost - self.least):
+        chosen = next((one for one in profiled if one.target == best.target), profiled[0])
+        followed = best.effect.remembers and best.target == chosen.target
+        starts = [one.addition for one in self.screened if one.addition.key == chosen.key]
+        lacks, gained = self.model.fit.cost, self.model.fit.cost - self.least
+        look = profile(
+            self._problem(starts[0]), starts[0], [addition.coefficient for addition in starts],
+            SMALL_STEPS if followed else FROM_MEASURED_MOTION, hopeless=lacks - THRESHOLDS.named_share * gained,
+        )  # fmt: skip
+        if lacks - look.fit.cost > THRESHOLDS.all_but_folds * gained:
             self._note(look.addition, closer(look))
 
     def hardly_screened(self) -> None:
