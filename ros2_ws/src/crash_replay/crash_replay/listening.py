@@ -32,7 +32,7 @@ class Listening:
         """wait_for: estimators to hear before the samples; hear: called with each message, serialized; more_to_come:
         whether a topic is known of that has not been found yet."""
         self.node, self.choice, self.wait_for, self.hear, self.more_to_come = node, choice, wait_for, hear, more_to_come
-        self.found: set[str] = set()  # names of topics that are wanted and said by somebody
+        self.found: set[str] = set()  # names of topics that are wanted and published
         self.heard: dict[str, Heard] = {}  # by name; the samples are found first and heard last
         self.newest = 0.0  # monotonic s, when a topic was found
         self.looked = time.monotonic()

@@ -16,7 +16,8 @@ from .gauss_newton import Fit, fit
 from .problem import OutputErrorProblem, Point
 
 STEP = 0.5
-"""Of the constant's logarithm, in the coarse look."""
+"""Of the constant's logarithm, in the coarse look, and what `closer` searches on either side of its best: the point of
+a V is within a step of the least value beside it. Not varied."""
 
 PRECISION = 1e-3
 """Of the logarithm: a thousandth of the slope; not varied."""

@@ -97,7 +97,9 @@ class Thresholds(NamedTuple):
     two are not named for another reason; what is named rightly on docs/outside.md has 0.80 and more. And share of what
     the best common effect leaves above the noise, in cost, that a rare one must explain to be believed in its place: of
     five looked-at cases of a Maxwell element it explained 0.80 to 0.93, in one of them under other contacts than stated
-    (0.54 under those); where a real impactor has a damper 0.07 to 0.21 near the noise, and up to 0.54 far from it."""
+    (0.54 under those); where a real impactor has a damper 0.07 to 0.21 near the noise, and up to 0.54 far from it. And
+    share of what the best one takes away, below which no fit of a profile is gone on with: far from
+    `all_but_folds`, from which it is looked at closer; not varied."""
     nearly_all: float = 0.99
     """Share of the misfit from which what one effect leaves may vary with time, if it is within the tolerance or less
     than the noise: sensors on mounts that ring are off by some 0.5 % in the band below. Of 105 looked-at cases outside
