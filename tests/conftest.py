@@ -30,7 +30,10 @@ def pytest_ignore_collect(collection_path, config):
     return None
 
 
-LONGEST = ("test_demo.py", "test_thesis.py", "test_coverage.py", "test_demo_search.py", "test_readme_demo.py")
+LONGEST = (
+    "test_demo.py", "test_thesis.py", "test_coverage.py", "test_demo_search.py", "test_readme_demo.py",
+    "test_viewer_revisions.py",
+)  # fmt: skip
 """Files of tests that take a minute or more, to be begun first: one that is begun last is waited for alone."""
 
 

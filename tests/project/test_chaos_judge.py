@@ -5,7 +5,8 @@ import pytest
 from crash_estimator.chaos.case import EXAMPLE, Case, Fault, case_of
 from crash_estimator.chaos.judge import COMPLETE, FAILED, SAID, Ended, Outcome, Product, judged
 from crash_estimator.chaos.plan import plan
-from crash_estimator.chaos.results import RESULTS, kept, rows
+from crash_estimator.chaos import results
+from crash_estimator.chaos.results import RESULTS, NoReference, kept, references, rows
 from crash_replay.recording import RecordingError
 
 REFERENCE = {"estimates": {"0": "a", "1": "b", "2": "c"}}
@@ -107,3 +108,20 @@ def test_a_judge_that_fails_costs_its_own_case_alone(tmp_path):
     done = list(rows(cases, tmp_path / RESULTS, found, jobs=1, seed=1))
     assert [row["verdict"] for row in done] == [FAILED, FAILED] and kept(tmp_path / RESULTS) == done
     assert all(row["why"].startswith("the judge failed: KeyError(") for row in done)
+
+
+@pytest.mark.parametrize("verdict", [COMPLETE, SAID])
+def test_only_what_is_complete_undisturbed_is_compared_with(monkeypatch, tmp_path, verdict):
+    case = case_of("estimators/frontal/kill:rls@played50%")
+
+    def done(cases, out, found, jobs):
+        assert [(one.name, found[one.name]) for one in cases] == [(case.undisturbed.name, None)]
+        yield {"case": case.undisturbed.name, "verdict": verdict, "why": "lost", "contents": REFERENCE}
+
+    monkeypatch.setattr(results, "_in_processes", done)
+    monkeypatch.setattr(results, "bag_of", lambda recording, bags: None)
+    if verdict == COMPLETE:
+        assert references([case, case], tmp_path) == {case.undisturbed.name: REFERENCE}
+    else:
+        with pytest.raises(NoReference, match=f"{case.undisturbed.name}: {verdict}: lost"):
+            references([case], tmp_path)

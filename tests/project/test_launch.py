@@ -8,6 +8,7 @@ from importlib import import_module
 from types import SimpleNamespace
 
 import pytest
+from helpers_domain import own_domain
 from helpers_paths import PACKAGES
 from mcap.reader import make_reader
 
@@ -21,7 +22,6 @@ from crash_estimator.chaos.launch_words import (
     described,
 )
 from crash_estimator.core.methods import METHODS
-from crash_estimator.demo.domain import free_domain
 from crash_replay.bag import read_bag
 from crash_replay.replay_parameters import PARAMETERS
 
@@ -210,7 +210,7 @@ def test_the_executables_and_the_launch_file_are_installed(launched):
 def as_processes(folder, **given):
     """The launch with its processes -> status and what they said."""
     command = [sys.executable, "-m", "crash_estimator.chaos.launching", *(f"{k}:={v}" for k, v in given.items())]
-    environment = os.environ | {"ROS_DOMAIN_ID": str(free_domain()), "PYTHONUNBUFFERED": "1"}
+    environment = os.environ | {"ROS_DOMAIN_ID": str(own_domain()), "PYTHONUNBUFFERED": "1"}
     ends = {"capture_output": True, "text": True, "timeout": 120.0}
     done = subprocess.run(command, cwd=folder, env=environment, **ends)
     return done.returncode, done.stdout + done.stderr

@@ -11,11 +11,11 @@ from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
+from helpers_domain import own_domain
 from helpers_paths import ROOT
 from helpers_setup import wheels_only
 
 from crash_estimator.chaos.members import node_command
-from crash_estimator.demo.domain import free_domain
 from crash_replay.starting import ENDING, held
 
 BAG = str(ROOT / "bags/impactor_single.mcap")
@@ -66,7 +66,7 @@ def interrupted(
 
 
 def test_whenever_it_comes_ctrl_c_shows_no_traceback(tmp_path):
-    environment = os.environ | {"ROS_DOMAIN_ID": str(free_domain()), "PYTHONUNBUFFERED": "1"}
+    environment = os.environ | {"ROS_DOMAIN_ID": str(own_domain()), "PYTHONUNBUFFERED": "1"}
     tries = [
         (name, command, STARTED * (k + 0.5 * (n % 2)) / moments, ENDING[k % len(ENDING)] if k % 2 else signal.SIGINT)
         for n, (name, (command, moments)) in enumerate(PROGRAMS.items())
