@@ -2,10 +2,10 @@
 
 import pytest
 
+from crash_estimator.chaos import results
 from crash_estimator.chaos.case import EXAMPLE, Case, Fault, case_of
 from crash_estimator.chaos.judge import COMPLETE, FAILED, SAID, Ended, Outcome, Product, judged
 from crash_estimator.chaos.plan import plan
-from crash_estimator.chaos import results
 from crash_estimator.chaos.results import RESULTS, NoReference, kept, references, rows
 from crash_replay.recording import RecordingError
 

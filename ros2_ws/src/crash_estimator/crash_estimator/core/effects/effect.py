@@ -46,6 +46,7 @@ class Shape:
     high: float
     starts: tuple[float, ...]
     of_crush: bool = False  # limits and starts are shares of the element's largest crush
+    both_ways: bool = False  # or of its largest extension, if that is larger and it has tension
     of_rate: bool = False  # where its largest rate of crush is below 5 m/s, less in proportion
 
 
@@ -226,9 +227,12 @@ class Effect:
         """Nats that it must gain with the coefficient c over others, where no measurement can tell them apart."""
         return 0.0
 
-    def is_doubt(self, magnitudes: "Magnitudes", addition: "Addition", c: float, shapes: Mapping[str, float]) -> bool:
+    def is_doubt(
+        self, magnitudes: "Magnitudes", addition: "Addition", c: float, shapes: Mapping[str, float],
+        largest_force: Callable[[str], float],
+    ) -> bool:  # fmt: skip
         """Whether it is no more, with the coefficient and shape constants found, than what is not known of a right
-        model anyway, or than what another effect is named for."""
+        model anyway, or than what another effect is named for; largest_force: N, of an element, as it was fitted."""
         return False
 
     def stated(self, c: float, **shapes: float) -> float:

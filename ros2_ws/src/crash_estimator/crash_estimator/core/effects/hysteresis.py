@@ -30,7 +30,7 @@ EFFECT = RememberingForce(
     "hysteresis",
     "N",
     {
-        "yield_crush": Shape("m", 0.001, 0.6, (0.05, 0.2), of_crush=True),
+        "yield_crush": Shape("m", 0.001, 0.6, (0.05, 0.2), of_crush=True, both_ways=True),
         "exponent": Shape("", 1.0, 10.0, (2.0,)),
     },
     memory=memory,

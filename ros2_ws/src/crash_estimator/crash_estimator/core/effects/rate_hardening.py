@@ -10,6 +10,8 @@ The coefficient is D, the rate in m/s that doubles the force: 1 + (V / D)^(1/q),
 fit works with c, in which the force is linear: c = 0 is no hardening, D infinite.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..structure import ModelError
@@ -47,7 +49,20 @@ def unstated(
     return float(1.0 / np.log(value / reference_rate))
 
 
-EFFECT = StaticFactor(
+@dataclass(frozen=True)
+class Hardening(StaticFactor):
+    """A factor of a material's."""
+
+    def is_doubt(self, magnitudes, addition, c, shapes, largest_force):
+        """An exponent at its limit: the force hangs on the rate otherwise than any material's does, as that of a spring
+        of rings, whose friction asks only which way it moves, or one that somebody else pushes for a while."""
+        if "exponent" not in shapes:
+            return False
+        limits = self.shapes["exponent"]
+        return not 1.001 * limits.low < shapes["exponent"] < 0.999 * limits.high
+
+
+EFFECT = Hardening(
     "rate_hardening",
     "m/s",
     {

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .base import ElementForce, ElementMotion, Shape
-from .kinds.element_force import PLASTIC
+from .kinds.element_force import HALF, PLASTIC
 
 MAIN_PART = 0.5
 """Of the largest force of an element, that it must yield at to be called plastic: of two names of one law, the one that
@@ -30,10 +30,14 @@ class Loss(ElementForce):
         stiffness = magnitudes.structure.elements[magnitudes.element(addition.target)].stiffness
         return self.low, self.high if stiffness.estimated else stiffness.value
 
-    def is_doubt(self, magnitudes, addition, c, shapes):
+    def prior_std(self, magnitudes, addition):
+        """It may be all that there was, which takes the element's force over the crush where it yields."""
+        element = magnitudes.element(addition.target)
+        return HALF * magnitudes.force[element] / addition.shapes["yield_crush"]
+
+    def is_doubt(self, magnitudes, addition, c, shapes, largest_force):
         yields_at = c * shapes["yield_crush"]  # N
-        largest = magnitudes.force[magnitudes.element(addition.target)]
-        return addition.variant == PLASTIC and yields_at < MAIN_PART * largest
+        return addition.variant == PLASTIC and yields_at < MAIN_PART * largest_force(addition.target)
 
 
 def force(motion: ElementMotion, yield_crush: float):

@@ -116,6 +116,13 @@ def linearise(
     return Equations(linear, sampled, rows, every, forces)
 
 
+def force_along(element: str, experiment: Experiment, theta: np.ndarray, trajectory: Trajectory) -> np.ndarray:
+    """(g,) N of an element."""
+    link = next(link for link in experiment.layout.links if link.name == element)
+    motion = _crush_and_rate(link, experiment, trajectory)
+    return link_force(link, theta, experiment.record.time, _steps(experiment.record), *motion).force
+
+
 def _link_forces(
     experiment: Experiment, theta: np.ndarray, trajectory: Trajectory, others: Sequence[OtherLaw], contact_ramp: float,
     actions: _Actions,

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_solve
 
 from ..mechanics.driven_motion import motion_of
-from ..mechanics.linearization import Equations
+from ..mechanics.linearization import Equations, force_along
 from ..observation.trajectory import Trajectory
 from ..parameterization.layout import Experiment, Layout
 from .continuation import FREE_RUN, FROM_MEASURED_MOTION, Schedule
@@ -75,6 +75,11 @@ class Fit(NamedTuple):
     def point(self) -> Point:
         return Point(self.theta, self.trajectories)
 
+    def largest_force(self, element: str) -> float:
+        """N, pushing or pulling."""
+        each = zip(self.problem.experiments, self.trajectories, strict=True)
+        return max(float(np.abs(force_along(element, one, self.theta, motion)).max()) for one, motion in each)
+
 
 def iterations_made() -> int:
     """Of all fits so far, each a pass over all recordings: work that is the same on every machine, and grows with the
@@ -129,13 +134,22 @@ def advance(
 
 def equation_error_start(problem: OutputErrorProblem, held: Sequence[int] = ()) -> Point:
     """The measured motion, and parameters that fit the forces along it; held: they stay as they start."""
-    layout = problem.layout
-    point = problem.measured(layout.start.copy())
-    stays = shape_parameters(layout)
-    stays[layout.common :] = True
-    stays[list(held)] = True
-    normal = equation_error(problem, point)
-    step = solve(layout, normal, point.theta, FROM_MEASURED_MOTION[0].inflate, stays)
+    stays = np.isin(np.arange(problem.layout.size), held)
+    stays[problem.layout.common :] = True
+    return _fitting_along(
+        problem, problem.measured(problem.layout.start.copy()), FROM_MEASURED_MOTION[0].inflate, stays
+    )
+
+
+def start_along(problem: OutputErrorProblem, trajectories: Sequence[Trajectory]) -> Point:
+    """The motions that another model has found, and parameters that fit the forces along them."""
+    along = problem.moved(problem.layout.start.copy(), trajectories)
+    return _fitting_along(problem, along, 1.0, np.zeros(problem.layout.size, bool))
+
+
+def _fitting_along(problem: OutputErrorProblem, point: Point, inflate: float, stays: np.ndarray) -> Point:
+    stays = stays | shape_parameters(problem.layout)
+    step = solve(problem.layout, equation_error(problem, point), point.theta, inflate, stays)
     return Point(point.theta + step.delta, point.trajectories)
 
 

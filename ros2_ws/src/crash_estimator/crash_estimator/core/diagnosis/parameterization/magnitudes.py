@@ -51,8 +51,11 @@ class Magnitudes(NamedTuple):
     def element(self, name: str) -> int:
         return [e.name for e in self.structure.elements].index(name)
 
-    def largest_crush(self, element: str) -> float:
-        return max(float(self.crush_range[self.element(element), 1]), 1e-4)
+    def largest_crush(self, element: str, both_ways: bool = False) -> float:
+        """m; both_ways: or extension, of an element with tension."""
+        k = self.element(element)
+        low, high = self.crush_range[k]
+        return max(float(high), float(-low) if both_ways and self.structure.elements[k].tension else 0.0, 1e-4)
 
     def largest_rate(self, target: str) -> float:
         """m/s: of an element, while it may carry, or of a body."""
@@ -64,7 +67,7 @@ class Magnitudes(NamedTuple):
     def shape_unit(self, shape: Shape, target: str) -> float:
         """What a shape constant's limits and starts are shares of."""
         if shape.of_crush:
-            return self.largest_crush(target)
+            return self.largest_crush(target, shape.both_ways)
         return min(self.largest_rate(target) / FAST, 1.0) if shape.of_rate else 1.0
 
     def crushed_elements(self) -> list[Element]:

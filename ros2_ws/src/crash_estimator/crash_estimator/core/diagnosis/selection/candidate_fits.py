@@ -8,7 +8,7 @@ import numpy as np
 
 from ...effects.effect import Addition, Effect
 from ..output_error.continuation import FROM_MEASURED_MOTION, FROM_SIMULATION, SLOW_CONTACT, SMALL_STEPS, Schedule
-from ..output_error.gauss_newton import MOST_ITERATIONS, Fit, fit
+from ..output_error.gauss_newton import MOST_ITERATIONS, Fit, fit, start_along
 from ..output_error.problem import OutputErrorProblem, Point, make_problem
 from ..output_error.profile_likelihood import closer, profile
 from ..parameterization.magnitudes import Magnitudes
@@ -80,7 +80,7 @@ def fit_candidates(
     if thorough and not search_is_over() and search.reached_the_floor():
         search.hardly_screened()
         if not model.white:
-            search.rival_with_care()
+            search.rivals_along()
     return search.ranking()
 
 
@@ -181,17 +181,18 @@ class _Search:
         new = [o for o in [*kin, *delays] if self.found[o.addition.key].fit is None]
         self.from_motion(shortlist(new, len(new)))
 
-    def rival_with_care(self) -> None:
-        """Fit another law on the same target that comes near the best one as carefully as that may need: what looks
-        like the second is else not told from it. Not one so far behind that no candidate is fitted to the end there."""
+    def rivals_along(self) -> None:
+        """Fit other laws on the same target along the motion that the best one has found: as that leaves only noise,
+        another one that is as good is near its own best there, however the usual fits were led astray."""
         best, *others = [one for one in self.ranking() if one.fit]
-        near = (one for one in others if one.addition.target == best.addition.target)
-        rival = next(near, None)
-        if rival and rival.fit.cost < best.fit.cost + THRESHOLDS.hopeless:
-            self.from_motion((one for one in self.screened if one.addition.key == rival.addition.key), SMALL_STEPS)
-            rival = self.found[rival.addition.key]
-            on = fit(rival.fit.problem, rival.fit.point, SLOW_CONTACT, most=2 * MOST_ITERATIONS)
-            self._note(rival.addition, on)
+        near = self.model.fit.cost - THRESHOLDS.all_but_folds * (self.model.fit.cost - best.fit.cost)
+        rivals = [o for o in others if o.addition.target == best.addition.target and o.fit.cost < near]
+        laws = {(one.addition.key, one.addition.variant): one.fit.cost for one in rivals}
+        for addition in (one.addition for one in self.screened):
+            cost = laws.get((addition.key, addition.variant))
+            if cost is not None:
+                problem = self._untrusting(addition)
+                self._note(addition, fit(problem, start_along(problem, best.fit.trajectories), hopeless=cost))
 
     def _best(self) -> list[CandidateFit]:
         return [one for one in self.ranking() if one.fit][: THRESHOLDS.few]
@@ -209,7 +210,8 @@ class _Search:
 
     def _note(self, addition: Addition, found: Fit) -> None:
         shapes = found.layout.term(addition).shapes_at(found.theta)
-        if addition.effect.is_doubt(self.magnitudes, addition, _coefficient(addition, found), shapes):
+        c = _coefficient(addition, found)
+        if addition.effect.is_doubt(self.magnitudes, addition, c, shapes, found.largest_force):
             return
         self.least = min(self.least, found.cost)
         gain = found.evidence - self.model.fit.evidence - odds_against(addition, found)
