@@ -100,6 +100,22 @@ def test_the_rate_of_cowper_and_symonds_doubles_the_force():
     assert_allclose(hardening.factor(np.array([-5.0, 0.0]), exponent=5.0), 0.0)
 
 
+@pytest.mark.parametrize(("exponent", "doubted"), [(0.7, False), (5.0, False), (9.9, False), (10.0, True)])
+def test_a_rate_law_whose_exponent_is_driven_to_its_limit_is_another_law_s(exponent, doubted):
+    hardening = EFFECTS["rate_hardening"]
+    assert hardening.is_doubt(None, None, 0.1, {"exponent": exponent}, None) == doubted
+    assert not hardening.is_doubt(None, None, 0.1, {"reference_rate": 10.0}, None)
+
+
+@pytest.mark.parametrize(("largest", "doubted"), [(1900.0, False), (2100.0, True)])
+def test_what_yields_and_stays_bent_is_called_so_where_it_yields_at_half_of_its_own_largest_force(largest, doubted):
+    yielding, shapes = EFFECTS["yielding"], {"yield_crush": 0.02}
+    asked = {"spring": largest}.__getitem__
+    for variant, said in (("plastic", doubted), ("", False), ("in_curve", False)):
+        addition = SimpleNamespace(target="spring", variant=variant)
+        assert yielding.is_doubt(None, addition, 5.0e4, shapes, asked) == said
+
+
 def test_the_logarithmic_rate_doubles_the_force_too_and_counts_from_its_reference_on():
     hardening = EFFECTS["rate_hardening"]
     c = hardening.unstated(40.0, reference_rate=0.5)

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from crash_estimator.core.diagnosis import Diagnosis, diagnose
 from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.observation.rest import rests_of
+from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 from crash_estimator.core.noise_spectrum import CORNER
 from crash_estimator.core.structure import Structure
 from crash_estimator.diagnosis_tables import ranking_table, revisions_table, steps_table
@@ -105,6 +106,21 @@ def test_rate_hardening_on_the_way_back_too_is_told_as_such(force, form, coeffic
     assert abs(step.coefficient - coefficient) < 4.0 * step.std
     (name, value) = next(iter(shape.items()))
     assert abs(step.shape[name] / value - 1.0) < 0.1 and abs(step.shape["rebound"] - 1.0) < 0.05
+
+
+def test_how_far_they_fly_apart_says_nothing_of_the_stiffness_between_them():
+    structure = model()
+    magnitudes = measure_magnitudes(structure, [observe(structure, collision(spring, SPEEDS[1], 1e4))])
+    ((low, high),) = magnitudes.crush_range
+    assert -low > 1.5 * high, "farther than they were crushed"
+    assert magnitudes.crush[0] == 2.0 * high
+
+
+def test_a_spring_of_rings_is_not_told_as_rate_hardening():
+    """Its friction is a share of its force, whatever the rate: an exponent at its limit followed that, with nothing
+    else left. No such law is known here."""
+    found = told(model(), lambda x, v: STIFFNESS * x * (1.0 + 0.3 * np.tanh(v / 0.02)))
+    assert found.verdict == "unexplained" or "rate_hardening" not in [s.effect for s in found.steps], found.text
 
 
 def test_a_filter_is_seen_in_a_short_recording():

@@ -46,6 +46,8 @@ def written(found: Diagnosis, model: str, folder) -> Structure:
         ("wall/cubic.beside/0.5g/clean/71700004", "", "springs"),
         ("side/damper.metered/1g/clean/71700005", "metered", "nothing"),
         ("cab/limit.plastic/1g/clean/71900000", "plastic", "nothing"),
+        ("cab/limit.plastic/1g/clean/34000268", "plastic", "nothing"),  # of a body that pushes on others as well
+        ("side/limit.plastic/2g/clean/36000074", "plastic", "nothing"),  # whose usual fits end at a kink
     ],
 )
 def test_the_form_of_a_law_is_found_and_can_be_read_back(name, form, contacts, tmp_path):

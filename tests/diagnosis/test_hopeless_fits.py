@@ -11,20 +11,30 @@ from crash_estimator.core.diagnosis.selection import assumptions, candidate_fits
 from crash_estimator.core.diagnosis.selection.fitted_model import Model
 
 
-@pytest.mark.parametrize(("behind", "asked"), [(0.9, True), (1.1, False)])
-def test_only_a_rival_that_is_near_is_fitted_with_care(monkeypatch, behind, asked):
+@pytest.mark.parametrize(
+    ("target", "takes_away", "asked"), [("spring", 0.96, True), ("spring", 0.94, False), ("foam", 0.96, False)]
+)
+def test_another_law_that_explains_as_much_is_fitted_along_the_motion_that_the_best_one_has_found(
+    monkeypatch, target, takes_away, asked
+):
+    """In the form that was found, from each of its starts, and no longer than it comes below its own cost."""
+    best, rival = candidate(900.0), candidate(800.0, ("hysteresis", target))
+    best.fit.cost, rival.fit.cost, best.fit.trajectories = 1000.0, 5000.0 - takes_away * 4000.0, "its motion"
+    best.addition.target, best.addition.variant = "spring", ""
+    rival.addition.target, rival.addition.variant = target, "dahl"
+    forms = (("dahl", 0.05), ("dahl", 0.2), ("", 0.05))
+    starts = [SimpleNamespace(key=rival.addition.key, variant=form, shapes=at) for form, at in forms]
     fits = []
-    best, rival = candidate(900.0), candidate(800.0, ("hysteresis", "spring"))
-    best.fit.cost, rival.fit.cost = 1000.0, 1000.0 + behind * THRESHOLDS.hopeless
-    best.addition.target = rival.addition.target = "spring"
-    rival.fit.problem = None
-    monkeypatch.setattr(candidate_fits, "fit", lambda *given, **more: fits.append("slowly"))
+    monkeypatch.setattr(candidate_fits, "start_along", lambda problem, motion: (problem, motion))
+    monkeypatch.setattr(candidate_fits, "fit", lambda *given, hopeless: (*given, hopeless))
     search = candidate_fits._Search(None, SimpleNamespace(fit=SimpleNamespace(cost=5000.0)), [])
+    search.screened = [SimpleNamespace(addition=one) for one in starts]
     search.found = {one.addition.key: one for one in (best, rival)}
-    search.from_motion = lambda chosen, schedule: fits.append("anew")
-    search._note = lambda *given: None
-    search.rival_with_care()
-    assert fits == (["anew", "slowly"] if asked else [])
+    search._untrusting = lambda addition: f"problem {starts.index(addition)}"
+    search._note = lambda addition, fitted: fits.append((starts.index(addition), fitted))
+    search.rivals_along()
+    wanted = [(k, (f"problem {k}", (f"problem {k}", "its motion"), rival.fit.cost)) for k in (0, 1)]
+    assert fits == (wanted if asked else [])
 
 
 @pytest.mark.parametrize(("cost", "refined"), [(1500.0, True), (2500.0, False)])

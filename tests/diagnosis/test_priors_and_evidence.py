@@ -13,9 +13,13 @@ from crash_estimator.core.diagnosis.output_error.normal_equations import Normal
 from crash_estimator.core.diagnosis.output_error.problem import embedding
 from crash_estimator.core.diagnosis.parameterization.free_curve import ROUGHNESS, Curve, adapted_roughness
 from crash_estimator.core.diagnosis.parameterization.layout import _element_link, _modes
+from crash_estimator.core.diagnosis.parameterization.magnitudes import Magnitudes
 from crash_estimator.core.diagnosis.parameterization.prior import Builder
 from crash_estimator.core.diagnosis.residuals.score_test import _statistic
 from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.effects.base import Shape
+from crash_estimator.core.effects.effect import Addition
+from crash_estimator.core.effects.kinds.element_force import HALF
 from crash_estimator.core.structure import Body, Coefficient, Element, Structure
 from crash_replay.recording import Channel, Recording, Test
 
@@ -110,6 +114,19 @@ def test_a_gap_to_both_sides_is_sought_of_an_element_that_can_pull_and_has_been_
         crush_range=np.array([[lowest, 0.1]]),
     )  # fmt: skip
     assert {one.variant for one in EFFECTS["clearance"].candidates(None, magnitudes)} == variants
+
+
+def test_a_limiter_may_lose_all_the_stiffness_that_it_had():
+    magnitudes = SimpleNamespace(force=[3000.0], element=lambda name: 0)
+    limiter = Addition(EFFECTS["yielding"], "belt", {"yield_crush": 0.02})
+    assert EFFECTS["yielding"].prior_std(magnitudes, limiter) == HALF * 3000.0 / 0.02
+
+
+@pytest.mark.parametrize(("tension", "both_ways", "way"), [(True, True, 0.1), (True, False, 0.02), (False, True, 0.02)])
+def test_the_way_of_an_element_that_is_stretched_more_than_crushed_is_its_extension(tension, both_ways, way):
+    structure = SimpleNamespace(elements=[SimpleNamespace(name="belt", tension=tension)])
+    magnitudes = Magnitudes(structure, (), (), *[None] * 8)._replace(crush_range=np.array([[-0.1, 0.02]]))
+    assert magnitudes.shape_unit(Shape("m", 0.1, 0.5, (0.2,), of_crush=True, both_ways=both_ways), "belt") == way
 
 
 def test_a_curve_s_force_at_no_crush_is_no_parameter():

@@ -62,9 +62,9 @@ def test_care_is_taken_within_reach_of_noise_and_with_a_further_effect_where_mos
     assert candidate_fits.fit_candidates(None, {}, before, thorough=True, earlier=earlier) == tried
 
 
-@pytest.mark.parametrize(("white", "asked"), [(False, ["hardly screened", "with care"]), (True, ["hardly screened"])])
+@pytest.mark.parametrize(("white", "asked"), [(False, ["hardly screened", "along"]), (True, ["hardly screened"])])
 def test_rivals_that_a_screening_does_not_see_are_fitted_beside_what_leaves_noise(monkeypatch, white, asked):
-    """And the next one with care, but where the model leaves noise as given."""
+    """And others along its motion, but where the model leaves noise as given."""
     called = []
 
     class Search:
@@ -76,7 +76,7 @@ def test_rivals_that_a_screening_does_not_see_are_fitted_beside_what_leaves_nois
 
         reached_the_floor = staticmethod(lambda: True)
         hardly_screened = staticmethod(lambda: called.append("hardly screened"))
-        rival_with_care = staticmethod(lambda: called.append("with care"))
+        rivals_along = staticmethod(lambda: called.append("along"))
 
     monkeypatch.setattr(candidate_fits, "_Search", Search)
     monkeypatch.setattr(candidate_fits, "candidates", lambda *given: ())

@@ -54,12 +54,9 @@ class Hardening(StaticFactor):
     """A factor of a material's."""
 
     def is_doubt(self, magnitudes, addition, c, shapes, largest_force):
-        """An exponent at its limit: the force hangs on the rate otherwise than any material's does, as that of a spring
-        of rings, whose friction asks only which way it moves, or one that somebody else pushes for a while."""
-        if "exponent" not in shapes:
-            return False
-        limits = self.shapes["exponent"]
-        return not 1.001 * limits.low < shapes["exponent"] < 0.999 * limits.high
+        """The largest exponent: the force hardly hangs on the rate, as that of a spring of rings, whose friction asks
+        only which way it moves."""
+        return shapes.get("exponent", 0.0) > 0.999 * self.shapes["exponent"].high
 
 
 EFFECT = Hardening(

@@ -19,7 +19,8 @@ from .kinds.element_force import HALF, PLASTIC
 
 MAIN_PART = 0.5
 """Of the largest force of an element, that it must yield at to be called plastic: of two names of one law, the one that
-says what most of the force does. The dry sliders of both simulators take 0.12 to 0.35."""
+says what most of the force does. The dry sliders of both simulators take 0.12 to 0.35, of 12 looked-at force limiters
+it was 0.99 and more."""
 
 
 @dataclass(frozen=True)

@@ -158,7 +158,9 @@ def measure_magnitudes(structure: Structure, records: Sequence[ObservedRecord], 
     ends = structure.ends
     force = np.array([min(body_force[ends[k, 0]], body_force[ends[k, 1]]) for k in elements])
     force = np.where(np.isfinite(force), force, body_force[np.isfinite(body_force)].max())
-    reach = crush_range[:, 1] - crush_range[:, 0]
+    low, high = crush_range.T
+    # how far a body has flown away from what cannot pull it says nothing of that: no farther than it was crushed
+    reach = high - np.where([element.tension for element in structure.elements], low, np.maximum(low, -high))
     shortest = min(SHORTEST_CRUSH, SHORTEST_SHARE * float(reach.max(initial=0.0))) or SHORTEST_CRUSH
     crush = np.maximum(reach, shortest)
     return Magnitudes(
