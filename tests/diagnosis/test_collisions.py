@@ -117,8 +117,8 @@ def test_how_far_they_fly_apart_says_nothing_of_the_stiffness_between_them():
 
 
 def test_a_spring_of_rings_is_not_told_as_rate_hardening():
-    """Its friction is a share of its force, whatever the rate: an exponent at its limit followed that, with nothing
-    else left. No such law is known here."""
+    """Its friction is a share of its force, whatever the rate: an exponent at its limit followed most of that. No such
+    law is known here."""
     found = told(model(), lambda x, v: STIFFNESS * x * (1.0 + 0.3 * np.tanh(v / 0.02)))
     assert found.verdict == "unexplained" or "rate_hardening" not in [s.effect for s in found.steps], found.text
 

@@ -56,6 +56,7 @@ class Hardening(StaticFactor):
     def is_doubt(self, magnitudes, addition, c, shapes, largest_force):
         """The largest exponent: the force hardly hangs on the rate, as that of a spring of rings, whose friction asks
         only which way it moves."""
+        # 0.999: a fit ends at a limit but for rounding
         return shapes.get("exponent", 0.0) > 0.999 * self.shapes["exponent"].high
 
 

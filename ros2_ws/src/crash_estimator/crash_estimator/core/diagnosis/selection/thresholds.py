@@ -127,7 +127,7 @@ class Thresholds(NamedTuple):
     hopeless: float = 400.0
     """Cost: a candidate that stays this far above the best one's is not fitted to the end, under any contacts; where
     the model leaves only noise, nor is one that does not come below the model's own. Of 150 looked-at cases of the
-    second simulator 146 are right so, 145 where under other contacts it did not hold."""
+    second simulator 146 were right so, 145 where other contacts, and a rival with care then, were fitted to the end."""
 
 
 THRESHOLDS = Thresholds()
