@@ -6,6 +6,7 @@ import pytest
 from helpers_paths import ROOT
 
 from crash_estimator.core.diagnosis import diagnose
+from crash_estimator.core.structure import Coefficient
 from crash_estimator.model_file import load_model
 from crash_replay.bag import read_bag
 
@@ -38,6 +39,16 @@ def test_every_recording_has_its_model():
 def test_a_model_that_lacks_nothing_is_adequate(name):
     found = diagnose(model(OWN[name]), [recording(name)])
     assert (found.verdict, found.complete, found.steps) == ("adequate", True, ())
+
+
+def test_an_unloading_stiffness_that_the_model_leaves_open_is_fitted_and_not_missing():
+    whole = model(OWN["frontal_single"])
+    (element,) = whole.elements
+    left_open = replace(element, unloading=None, unloading_slope=Coefficient(0.25 * element.unloading, True))
+    found = diagnose(replace(whole, elements=(left_open,)), [recording("frontal_single")])
+    assert (found.verdict, found.complete, found.steps) == ("adequate", True, ())
+    (fitted,) = (one for one in found.constants if one.constant == "unloading")
+    assert abs(fitted.value - element.unloading) < 4.0 * fitted.std < 0.05 * element.unloading
 
 
 def test_what_both_structures_of_a_car_lack_is_named_on_both():

@@ -100,7 +100,7 @@ def test_the_first_instant_stands_for_as_long_a_step_as_the_next(dt):
 def test_a_force_of_the_crush_alone_is_sought_where_no_free_curve_contains_it(stiffness, unloading, sought):
     effect = ElementForce("bump", "N", force=lambda motion: motion.crush**2, size=1.0, of_crush_only=True)
     element = SimpleNamespace(name="spring", stiffness=stiffness, unloading=unloading, unloads=unloading is not None)
-    magnitudes = SimpleNamespace(crushed_elements=lambda: [element], element=lambda name: 0)
+    magnitudes = SimpleNamespace(strained_elements=lambda: [element], element=lambda name: 0)
     assert bool(list(effect.candidates(SimpleNamespace(), magnitudes))) == sought
 
 

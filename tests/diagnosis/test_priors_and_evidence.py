@@ -103,17 +103,42 @@ def test_a_spring_has_a_constant_only_where_it_is_unknown_and_no_curve(estimated
     assert [one.name for one in builder.parameters] == names
 
 
+def strained(tension: bool, low: float, high: float) -> Magnitudes:
+    """Of one element that has been crushed to `high` m, and stretched to `low`."""
+    spring = Element("spring", ("car", "wall"), Coefficient(1e5), tension=tension)
+    structure = SimpleNamespace(elements=[spring], body_index={})
+    return Magnitudes(structure, (), (), *[None] * 8)._replace(
+        crush_range=np.array([[low, high]]), rate=np.array([3.0])
+    )
+
+
 @pytest.mark.parametrize(
-    ("tension", "lowest", "variants"),
-    [(True, -0.1, {"", "play"}), (True, 0.0, {""}), (False, -0.1, {""}), (False, 0.0, {""})],
-)
-def test_a_gap_to_both_sides_is_sought_of_an_element_that_can_pull_and_has_been_pulled(tension, lowest, variants):
-    element = SimpleNamespace(name="spring", tension=tension)
-    magnitudes = SimpleNamespace(
-        crushed_elements=lambda: [element], largest_crush=lambda name: 0.1, element=lambda name: 0,
-        crush_range=np.array([[lowest, 0.1]]),
-    )  # fmt: skip
-    assert {one.variant for one in EFFECTS["clearance"].candidates(None, magnitudes)} == variants
+    ("tension", "low", "high", "variants"),
+    [
+        (True, -0.1, 0.1, {"", "play"}), (True, 0.0, 0.1, {""}), (False, -0.1, 0.1, {""}), (False, 0.0, 0.1, {""}),
+        (True, -0.1, 0.0, {"play"}), (False, -0.1, 0.0, set()),
+    ],
+)  # fmt: skip
+def test_a_gap_to_both_sides_is_sought_of_an_element_that_can_pull_and_has_been_pulled(tension, low, high, variants):
+    found = list(EFFECTS["clearance"].candidates(None, strained(tension, low, high)))
+    assert {one.variant for one in found} == variants
+    assert all(0.0 < one.coefficient < max(high, -low) for one in found)
+
+
+@pytest.mark.parametrize(("tension", "sought"), [(True, True), (False, False)])
+def test_of_what_is_only_stretched_all_but_the_laws_of_crush_is_sought(tension, sought):
+    """The lashing of a load, which no candidate was sought for: a load path beside it was told."""
+    lashing = strained(tension, -0.05, 0.0)
+    of_elements = {name: effect for name, effect in EFFECTS.items() if effect.acts_on == "element"}
+    found = {name: list(effect.candidates(lashing.structure, lashing)) for name, effect in of_elements.items()}
+    either_way = {"viscous_damping", "quadratic_damping", "coulomb_friction", "hysteresis", "maxwell_element"}
+    assert {name for name, ones in found.items() if ones} >= either_way if sought else not any(found.values())
+    assert not any(found[name] for name in ("bottoming_out", "yielding", "plastic_unloading", "gas_cushion"))
+    ways = [one.shapes["yield_crush"] for one in found["hysteresis"]]
+    assert (
+        all(0.001 < way < 0.05 for way in ways)
+        and lashing.strained_elements() == list(lashing.structure.elements)[:sought]
+    )
 
 
 def test_a_limiter_may_lose_all_the_stiffness_that_it_had():

@@ -55,9 +55,9 @@ def test_the_look_at_a_profile_goes_on_from_its_start_as_long_as_the_cost_falls(
 
 
 @pytest.mark.parametrize(("leads", "on", "looked_at", "schedule"), [
-    ("hysteresis", "front", "front", SMALL_STEPS),  # as it follows what unloads on a slope of its own
-    ("rate_hardening", "front", "front", FROM_MEASURED_MOTION),
-    ("hysteresis", "belt", "rear", FROM_MEASURED_MOTION),  # of which no slope is offered: the likeliest
+    ("hysteresis", "front", ["front"], SMALL_STEPS),  # as it follows what unloads on a slope of its own
+    ("rate_hardening", "front", ["front"], FROM_MEASURED_MOTION),
+    ("hysteresis", "belt", ["rear", "front"], FROM_MEASURED_MOTION),  # of which no slope is offered: the likeliest
 ])  # fmt: skip
 def test_a_profile_is_looked_at_on_the_target_of_what_leads_with_care_where_that_remembers(
     monkeypatch, leads, on, looked_at, schedule
@@ -66,7 +66,21 @@ def test_a_profile_is_looked_at_on_the_target_of_what_leads_with_care_where_that
     monkeypatch.setattr(candidate_fits, "profile", lambda *given, **more: asked.append(given) or look_of(1e3, given[1]))
     search = search_with(leads, on)
     search.profile()
-    assert [(addition.target, starts, how) for _, addition, starts, how in asked] == [(looked_at, [1e6], schedule)]
+    assert [addition.target for addition in search.fitted] == looked_at, "as any other, before"
+    assert [(addition.target, starts, how) for _, addition, starts, how in asked] == [
+        (target, [1e6], schedule) for target in looked_at
+    ]
+
+
+@pytest.mark.parametrize("after", [0, 1, 2])
+def test_no_profile_is_looked_at_once_noise_is_left(monkeypatch, after):
+    """By the fit of the first slope as any other; by its profile; by the fit of the second."""
+    asked, answers = [], iter([k >= after for k in range(4)])
+    monkeypatch.setattr(candidate_fits, "profile", lambda *given, **more: asked.append(given) or look_of(1e3, given[1]))
+    search = search_with("added_mass", "mdb")
+    search.reached_the_floor = lambda: next(answers)
+    search.profile()
+    assert (len(search.fitted), len(asked)) == {0: (1, 0), 1: (1, 1), 2: (2, 1)}[after]
 
 
 @pytest.mark.parametrize(("cost", "looked_closer_at"), [(530.0, False), (520.0, True), (20.0, True)])
@@ -95,6 +109,9 @@ def search_with(leads: str, on: str) -> candidate_fits._Search:
     search.found[best.key] = candidate_fits.CandidateFit(best, 100.0, SimpleNamespace(cost=500.0))
     search.least = 500.0
     search._problem = lambda addition: None
+    search.fitted = []
+    search._fit = search.fitted.append
+    search.reached_the_floor = lambda: False
     return search
 
 

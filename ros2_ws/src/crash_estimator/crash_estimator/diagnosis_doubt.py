@@ -59,7 +59,7 @@ def worst_explained(model: Model) -> tuple[str, float]:
     for q, output in enumerate(model.fit.layout.outputs):
         measured = np.concatenate([record.measured[:, q] for record in model.records])
         left = np.concatenate([residual[:, q] for residual in model.residuals.residual])
-        noise = float(np.mean([record.noise[q] ** 2 for record in model.records]))
+        noise = float(np.nanmean([np.nanmean(record.noise_of_samples[:, q] ** 2) for record in model.records]))
         power = float(np.nanmean(measured**2))
         if power > HEARD**2 * noise:
             share = 1.0 - max(float(np.nanmean(left**2)) - noise, 0.0) / (power - noise)

@@ -109,8 +109,7 @@ def revisions_table(found: Diagnosis) -> str:
         each = [f"{value:#.3g}" for value in _each_output(model, model.residuals.residual)]
         rows.append((name, f"{model.residuals.rms / G:#.3g}", *each, f"{run / G:#.3g}", white))
     first = found.models[0]
-    noise = [np.broadcast_to(record.noise, record.measured.shape) for record in first.records]
-    floor = [f"{value:#.3g}" for value in _each_output(first, noise)]
+    floor = [f"{value:#.3g}" for value in _each_output(first, [record.noise_of_samples for record in first.records])]
     rows.append(("noise floor", f"{found.residual_rms.noise_floor / G:#.3g}", *floor, "", ""))
     outputs = first.fit.layout.outputs
     heads = [f"{output.channel} {unit}" for output, (unit, _) in zip(outputs, _units(first))]

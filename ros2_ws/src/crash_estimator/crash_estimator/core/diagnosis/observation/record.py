@@ -118,6 +118,12 @@ class ObservedRecord(NamedTuple):
         return weights(self.spectra, self.below, n, period, means_over)
 
     @property
+    def noise_of_samples(self) -> np.ndarray:
+        """(n, q) standard deviation of the sensors' noise in a sample; NaN where that is missing."""
+        each = np.array([spectrum.of_one_sample for spectrum in self.spectra])
+        return np.where(np.isfinite(self.measured), each, np.nan)
+
+    @property
     def compared(self) -> np.ndarray:
         """(q,) share of the frequencies."""
         return np.ones(len(self.noise)) if self.weight is None else (self.weight > 0.0).mean(axis=0)

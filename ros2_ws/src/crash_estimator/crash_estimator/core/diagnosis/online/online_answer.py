@@ -52,8 +52,7 @@ class OnlineAnswer(NamedTuple):
 def final_answer(found: Diagnosis) -> OnlineAnswer:
     """The offline answer; of its recordings the first is the one that is replayed."""
     first, last = found.models[0], found.models[-1]
-    present = len(first.additions)
-    effects = found.structure.effects[present:]
+    effects = found.structure.effects[len(first.fit.layout.structure.effects) :]
     force, share = next(iter(found.steps[0].force_explained.items() if found.steps else ()), ("", {}))
     return OnlineAnswer(
         verdict=found.verdict,
@@ -67,8 +66,7 @@ def final_answer(found: Diagnosis) -> OnlineAnswer:
         white=(first.residuals.band_test, last.residuals.band_test),
         misfit=misfit_windows(first.fit.layout, first.records[:1], first.residuals),
         fits=tuple(
-            curves(m.fit.layout, m.records[0], m.residuals.predicted[0], effects[: len(m.additions) - present])
-            for m in found.models
+            curves(m.fit.layout, m.records[0], m.residuals.predicted[0], effects[: len(m.found)]) for m in found.models
         ),
         final=True,
         force=force,

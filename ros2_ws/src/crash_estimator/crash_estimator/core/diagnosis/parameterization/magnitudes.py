@@ -10,10 +10,10 @@ import numpy as np
 
 from ...effects.effect import Addition, ElementMotion, Shape
 from ...structure import Element, Structure
-from ..observation.grid import binned
-from ..observation.record import ObservedRecord, outputs_of
+from ..observation.record import ObservedRecord
 from ..observation.trajectory import Trajectory, element_motion, integrate, measured_trajectory
 from .free_curve import make_knots
+from .largest_forces import largest_in_elements, largest_on_bodies
 
 CELLS = 36
 """Of a free curve over its crush scale: 1 cm of a crush of 0.4 m, the length of a fold of a longitudinal."""
@@ -71,8 +71,13 @@ class Magnitudes(NamedTuple):
         return min(self.largest_rate(target) / FAST, 1.0) if shape.of_rate else 1.0
 
     def crushed_elements(self) -> list[Element]:
-        """Elements that are crushed at all: of the others nothing can be told."""
+        """Elements that are crushed at all: of the others no law of crush can be told."""
         return [e for k, e in enumerate(self.structure.elements) if self.crush_range[k, 1] > 0.0]
+
+    def strained_elements(self) -> list[Element]:
+        """Those, and what is only stretched, and pulls, as the lashing of a load."""
+        low, high = self.crush_range.T
+        return [e for k, e in enumerate(self.structure.elements) if high[k] > 0.0 or (e.tension and low[k] < 0.0)]
 
     def coefficient(self, addition: Addition) -> float:
         """Prior standard deviation of an addition's coefficient."""
@@ -134,18 +139,7 @@ def attached_start(structure: Structure, record: ObservedRecord, addition) -> tu
 def measure_magnitudes(structure: Structure, records: Sequence[ObservedRecord], cells: int = CELLS) -> Magnitudes:
     """Along the measured motion; cells: of a curve."""
     measured = tuple(measured_trajectory(structure, record) for record in records)
-    outputs = outputs_of(structure)
-    body_force = np.full(len(structure.bodies), np.inf)
-    for k, body in enumerate(structure.bodies):
-        rows = [q for q, output in enumerate(outputs) if output.body == k]
-        if body.motion_channel or body.derived:
-            body_force[k] = body.mass * max(float(np.abs(motion.a[:, k]).max()) for motion in measured)
-        elif rows:
-            inertia = body.mass if body.free else 1.0
-            body_force[k] = inertia * max(_peak(record, rows) for record in records)
-        if body.applied:
-            pushed = max(float(np.abs(record.signals[body.applied].values).max()) for record in records)
-            body_force[k] = max(body_force[k], pushed) if rows else pushed
+    body_force = largest_on_bodies(structure, records, measured)
     elements = range(len(structure.elements))
     crush_range, rate = np.zeros((len(elements), 2)), np.full(len(elements), SLOWEST)
     for k in elements:
@@ -155,9 +149,7 @@ def measure_magnitudes(structure: Structure, records: Sequence[ObservedRecord], 
             crush_range[k, 1] = max(crush_range[k, 1], motion.crush.max())
             touches = structure.elements[k].tension | (motion.crush > 0.0)
             rate[k] = max(rate[k], np.abs(motion.rate[touches]).max(initial=0.0))
-    ends = structure.ends
-    force = np.array([min(body_force[ends[k, 0]], body_force[ends[k, 1]]) for k in elements])
-    force = np.where(np.isfinite(force), force, body_force[np.isfinite(body_force)].max())
+    force = largest_in_elements(structure, records, measured, body_force)
     low, high = crush_range.T
     # how far a body has flown away from what cannot pull it says nothing of that: no farther than it was crushed
     reach = high - np.where([element.tension for element in structure.elements], low, np.maximum(low, -high))
@@ -166,12 +158,3 @@ def measure_magnitudes(structure: Structure, records: Sequence[ObservedRecord], 
     return Magnitudes(
         structure, records, measured, body_force, crush_range, rate, crush, force, force / crush, cells, shortest
     )
-
-
-def _peak(record: ObservedRecord, rows: list[int]) -> float:
-    """Largest mean over a bin of a body's outputs."""
-    found = record.measured[:, rows]
-    known = np.isfinite(found)
-    each = np.stack([np.where(known, found, 0.0).sum(axis=1), known.sum(axis=1)], axis=1)
-    total, count = binned(record.bin[record.at], each, record.bins).T
-    return float(np.abs(total / np.maximum(count, 1.0)).max())

@@ -1,16 +1,28 @@
-"""Effects of a model file as additions of a fit."""
+"""Effects of a model file, and the unloading stiffnesses that it leaves open, as additions of a fit."""
 
 from collections.abc import Mapping
 
 from ...effects.effect import Addition, Effect
 from ...effects.targets import checked
-from ...structure import EffectSpec
+from ...structure import EffectSpec, Element, Structure
 from .magnitudes import Magnitudes
 
 
 def additions_of(magnitudes: Magnitudes, effects: Mapping[str, Effect]) -> tuple[Addition, ...]:
     """Raises ModelError where a model names an effect or a target that there is not."""
-    return tuple(_addition(magnitudes, spec, effects) for spec in magnitudes.structure.effects)
+    structure, line = magnitudes.structure, effects["plastic_unloading"]
+    stated = [_addition(magnitudes, spec, effects) for spec in structure.effects]
+    return (*stated, *(Addition(line, e.name, coefficient=e.unloading_slope.value) for e in _open_lines(structure)))
+
+
+def number_of_additions(structure: Structure) -> int:
+    """How many `additions_of` finds."""
+    return len(structure.effects) + len(_open_lines(structure))
+
+
+def _open_lines(structure: Structure) -> list[Element]:
+    """Elements whose unloading stiffness is to be estimated."""
+    return [element for element in structure.elements if element.unloading_slope]
 
 
 def _addition(magnitudes: Magnitudes, spec: EffectSpec, effects: Mapping[str, Effect]) -> Addition:

@@ -9,10 +9,10 @@ from ..output_error.gauss_newton import Fit
 
 
 class FittedConstant(NamedTuple):
-    """A stiffness or a damping that the model file leaves open."""
+    """A stiffness, a damping or an unloading stiffness that the model file leaves open."""
 
     element: str
-    constant: str  # stiffness or damping
+    constant: str  # stiffness, damping or unloading
     value: float
     std: float
     unit: str
@@ -24,9 +24,13 @@ def fitted_constants(fitted: Fit) -> tuple[FittedConstant, ...]:
 
 
 def _each(fitted: Fit) -> Iterator[FittedConstant]:
-    names = {element.name for element in fitted.layout.structure.elements}
-    for link in fitted.layout.links:
-        for constant, p, unit in (("stiffness", link.constant, "N/m"), ("damping", link.damping, "N*s/m")):
-            if link.name in names and p is not None:
+    elements = {element.name: element for element in fitted.layout.structure.elements}
+    for link in (link for link in fitted.layout.links if link.name in elements):
+        constants = [("stiffness", link.constant, "N/m"), ("damping", link.damping, "N*s/m")]
+        if elements[link.name].unloading_slope:
+            lines = [term.coefficient for term in link.terms if term.addition.effect.replaces == "unloading"]
+            constants += [("unloading", p, "N/m") for p in lines]
+        for constant, p, unit in constants:
+            if p is not None:
                 std = float(np.sqrt(fitted.covariance[p, p]))
                 yield FittedConstant(link.name, constant, float(fitted.theta[p]), std, unit)

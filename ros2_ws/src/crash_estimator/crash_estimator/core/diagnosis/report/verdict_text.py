@@ -85,12 +85,18 @@ def _missing(evidence: Evidence, tolerance: Tolerance, steps, first: Model, fina
     if evidence.noise:
         small = first.residuals.rms < THRESHOLDS.near_floor**0.5 * floor
         why = f"; small, yet noise would not leave it ({steps[0].evidence:.0f} nats of evidence)" if small else ""
-        return f"{_names(steps)}; {_size(first, final, floor)}, now white{why}{advice}"
+        return f"{_names(steps)}; {_size(first, final, floor)}, now white{_in_the_band(final)}{why}{advice}"
     share = evidence.after.share_explained(evidence.before)
     within = tolerance.admits(evidence.after)
     grade = f"is within {tolerance.text}" if within else f"is more than {tolerance.text}, and is no noise: incomplete"
     explains = f"{'it explains' if len(steps) == 1 else 'they explain'} {share:.0%} of the misfit"
     return f"{_names(steps)}; {explains}, {_fall(evidence)}; {_what_is_left(evidence.after)}, {grade}{advice}"
+
+
+def _in_the_band(model: Model) -> str:
+    """Where filtered sensors end the comparison: what a model leaves beyond is in its RMS and says nothing of it."""
+    passed = min(spectrum.passed for record in model.records for spectrum in record.spectra)
+    return f" below {passed:.0f} Hz, up to where the sensors' filters show it" if passed < float("inf") else ""
 
 
 def _unexplained(evidence: Evidence, steps, first: Model, final: Model, floor: float) -> str:

@@ -54,8 +54,7 @@ def rms(layout: Layout, values: Sequence[np.ndarray]) -> float:
 
 def noise_floor(layout: Layout, records: Sequence[ObservedRecord]) -> float:
     """The RMS that the sensors' noise alone leaves, m/s^2."""
-    of_one = [np.array([s.of_one_sample for s in record.spectra]) for record in records]
-    return rms(layout, [np.where(np.isfinite(r.measured), one, np.nan) for r, one in zip(records, of_one, strict=True)])
+    return rms(layout, [record.noise_of_samples for record in records])
 
 
 @may_diverge

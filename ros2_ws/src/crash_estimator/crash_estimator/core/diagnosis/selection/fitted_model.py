@@ -13,6 +13,7 @@ from ..output_error.problem import OutputErrorProblem, Point, make_problem
 from ..parameterization.free_curve import adapted_roughness
 from ..parameterization.layout import Layout
 from ..parameterization.magnitudes import Magnitudes
+from ..parameterization.model_terms import number_of_additions
 from ..residuals.residuals import Residuals, analyse
 from .acceptance import better, cost_of_nothing, mean_square_of_nothing, settled
 
@@ -41,7 +42,7 @@ class Model(NamedTuple):
     @property
     def given(self) -> tuple[Addition, ...]:
         """The additions that the structure had."""
-        return self.additions[: len(self.fit.layout.structure.effects)]
+        return self.additions[: number_of_additions(self.fit.layout.structure)]
 
     @property
     def found(self) -> tuple[Addition, ...]:

@@ -89,7 +89,7 @@ def _one_by_one(
         if evenly and explains_too_little(done.sized, evenly, band_of_steps(path)):
             return path, done.before
         model = larger
-    return path, model
+    return without_the_superseded(magnitudes, path, model)
 
 
 def _followed(path: Sequence[SelectionStep]) -> tuple[str, str] | None:
@@ -127,7 +127,7 @@ def _next_step(
     if not (only_to_noise and far_from_noise):
         step = in_recorded_noise(magnitudes, effects, model, path)
         tried = step.candidates[:1]
-        step = elsewhere_than(rare, step) if rare else step
+        step = elsewhere_than(magnitudes, rare, step) if rare else step
         in_vain = only_to_noise or (found and not far_from_noise and _all_explain_too_little(step, path))
         if step.leaves_noise or not in_vain:
             return step

@@ -34,9 +34,9 @@ def without_the_superseded(
             number += 1
             continue
         path = path[:number] + path[number + 1 :]
-        models = [_refitted(magnitudes, given + fewer[:k], final) for k in range(len(path) - 1)] + [smaller]
+        models = [_refitted(magnitudes, given + fewer[:k], final) for k in range(len(fewer))] + [smaller]
         gains = [b.fit.evidence - a.fit.evidence for a, b in zip(models, models[1:], strict=False)] + [None]
-        path = [_again(*each) for each in zip(path, models, gains, strict=True)]
+        path = [_again(*each) for each in zip(path, models, gains, strict=False)]  # it may end before the last model
         final = smaller
     return path, final
 

@@ -69,7 +69,7 @@ class ElementForce(Effect):
         )  # fmt: skip
 
     def candidates(self, structure, magnitudes):
-        for element in magnitudes.crushed_elements():
+        for element in magnitudes.strained_elements():
             free_curve = _is_curve(element)
             # a free curve of an elastic element contains a function of the crush alone
             contained = self.of_crush_only and free_curve and not element.unloading
@@ -93,8 +93,12 @@ def _is_curve(element) -> bool:
 
 
 def on_element(effect: Effect, magnitudes, element: str, variant: str = ""):
-    """One addition for each combination of the starts of its shape constants."""
+    """One addition for each combination of the starts of its shape constants; none where one is a share of the crush,
+    and there is none."""
     shapes = effect.shapes_of(variant)
+    of_crush = any(shape.of_crush and not shape.both_ways for shape in shapes.values())
+    if of_crush and element not in {crushed.name for crushed in magnitudes.crushed_elements()}:
+        return
     names, unit = list(shapes), [magnitudes.shape_unit(shape, element) for shape in shapes.values()]
     for values in product(*(shape.starts for shape in shapes.values())):
         yield Addition(

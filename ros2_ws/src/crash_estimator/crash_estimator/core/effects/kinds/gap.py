@@ -42,12 +42,14 @@ class Gap(Effect):
         return -side * np.where(on_line, kx + kp, kx)
 
     def candidates(self, structure, magnitudes):
-        for element in magnitudes.crushed_elements():
-            largest = magnitudes.largest_crush(element.name)
-            pulled = magnitudes.crush_range[magnitudes.element(element.name), 0] < -STARTS[0] * largest
-            for variant in self.variants if element.tension and pulled else ("",):
-                for share in STARTS:
-                    yield Addition(self, element.name, coefficient=share * largest, variant=variant)
+        for element in magnitudes.strained_elements():
+            low, high = magnitudes.crush_range[magnitudes.element(element.name)]
+            for variant in self.variants:
+                largest = magnitudes.largest_crush(element.name, both_ways=variant == "play")
+                pulled = element.tension and low < -STARTS[0] * largest
+                if pulled if variant == "play" else high > 0.0:
+                    for share in STARTS:
+                        yield Addition(self, element.name, coefficient=share * largest, variant=variant)
 
     def prior_std(self, magnitudes, addition):
         return TYPICAL * magnitudes.crush[magnitudes.element(addition.target)]

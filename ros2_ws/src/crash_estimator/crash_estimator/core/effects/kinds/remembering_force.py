@@ -39,7 +39,7 @@ class RememberingForce(Effect):
         return with_action(structure, spec, self.unit, "memory", k, coefficient_of(spec, self), scale, force=memory)
 
     def candidates(self, structure, magnitudes):
-        for element in magnitudes.crushed_elements():
+        for element in magnitudes.strained_elements():
             for addition in on_element(self, magnitudes, element.name):
                 yield from (replace(addition, variant=form) for form in self.variants)
 

@@ -47,7 +47,7 @@ class StaticFactor(Effect):
         )
 
     def candidates(self, structure, magnitudes):
-        for element in magnitudes.crushed_elements():
+        for element in magnitudes.strained_elements():
             for variant in self.variants:
                 yield from on_element(self, magnitudes, element.name, variant)
 
