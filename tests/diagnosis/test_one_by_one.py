@@ -75,12 +75,22 @@ def test_what_explains_too_little_is_not_added_and_nothing_after_it(monkeypatch)
     assert len(final.additions) == 1 and final is path[1].before and len(path) == 2 and not told
 
 
+def test_what_was_found_until_the_limit_is_asked_whether_all_of_it_is_needed(monkeypatch):
+    """The search is over once a second one was added."""
+    found = []
+    monkeypatch.setattr(forward_selection, "search_is_over", lambda: len(found) == 2)
+    monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final: ("fewer", final))
+    path, final = one_by_one(monkeypatch, 100.0, lambda before: found.append(before) or step(before))
+    assert path == "fewer" and len(final.additions) == 2
+
+
 none_leads = forward_selection._none_leads
 
 
 @pytest.fixture(autouse=True)
-def any_leads(monkeypatch):
+def any_leads_and_none_is_superseded(monkeypatch):
     monkeypatch.setattr(forward_selection, "_none_leads", lambda step: False)
+    monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final: (path, final))
 
 
 @pytest.mark.parametrize(("leads", "added"), [([False, False], 0), ([False, True], 2), ([True], 2)])
@@ -145,5 +155,4 @@ def one_by_one(
     monkeypatch.setattr(forward_selection, "band_of_steps", lambda path: None)
     monkeypatch.setattr(forward_selection, "evenly_fitted", lambda *given: "with it")
     monkeypatch.setattr(forward_selection, "explains_too_little", little)
-    monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final: (path, final))
     return forward_selection._one_by_one(SimpleNamespace(structure=None), {}, model(left), [])

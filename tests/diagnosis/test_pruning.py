@@ -16,6 +16,7 @@ def model(additions, white=True):
     return SimpleNamespace(additions=found, given=(), found=found, white=white, fit=SimpleNamespace(evidence=evidence))
 
 
+@pytest.mark.parametrize("at_its_limit", [False, True])  # there the search ends with the last that was added
 @pytest.mark.parametrize(
     ("spared", "left"),
     [
@@ -25,7 +26,7 @@ def model(additions, white=True):
         ({"mimic", "damper"}, ["friction"]),
     ],
 )
-def test_an_effect_that_the_rest_leaves_noise_without_goes_again(monkeypatch, spared, left):
+def test_an_effect_that_the_rest_leaves_noise_without_goes_again(monkeypatch, spared, left, at_its_limit):
     """The last one found stays: without it there was no noise."""
     names = ["mimic", "damper", "friction"]
     monkeypatch.setattr(
@@ -34,12 +35,11 @@ def test_an_effect_that_the_rest_leaves_noise_without_goes_again(monkeypatch, sp
         lambda magnitudes, additions, like: model(additions, white={*names} - {*additions} <= spared),
     )
     path = [SelectionStep(model(names[:k], k == 3), [CandidateFit(name, 50.0, "fit")]) for k, name in enumerate(names)]
-    path.append(SelectionStep(model(names), []))
-    path[-1] = path[-1]._replace(candidates=[CandidateFit("none", 0.5 * THRESHOLDS.gain, "fit")])
-    found, final = pruning.without_the_superseded(None, path, model(names))
+    last = SelectionStep(model(names), [CandidateFit("none", 0.5 * THRESHOLDS.gain, "fit")])
+    found, final = pruning.without_the_superseded(None, path if at_its_limit else [*path, last], model(names))
     assert list(final.additions) == left
-    assert [step.candidates[0].addition for step in found] == [*left, "none"]
-    assert found[-1].before.additions == final.additions
+    assert [step.candidates[0].addition for step in found] == [*left, *([] if at_its_limit else ["none"])]
+    assert [list(step.before.additions) for step in found] == [left[:k] for k in range(len(found))]
 
 
 @pytest.mark.parametrize(("ended", "left"), [(0.0, ["damper"]), (9.0, ["mimic", "damper"])])

@@ -222,10 +222,11 @@ class GaussNewton:
         filtered[:, :parameters] = regression.gradient
         for k, (d, a) in enumerate(self._slices(equations)):
             for i, then in zip(range(d.start, d.stop), past, strict=False):
-                error = np.nan_to_num(then.target[k] - then.gradient[k] @ theta[:parameters])
-                expected[k] -= theta[i] * error
-                filtered[k, :parameters] += theta[i] * then.gradient[k] * ~np.isnan(then.target[k])
-                filtered[k, i] -= error
+                error = then.target[k] - then.gradient[k] @ theta[:parameters]
+                if error == error:  # else it was not measured
+                    expected[k] -= theta[i] * error
+                    filtered[k, :parameters] += theta[i] * then.gradient[k]
+                    filtered[k, i] -= error
             for j, then in zip(range(a.start, a.stop), past, strict=False):
                 expected[k] += theta[j] * then.error[k]
                 filtered[k, j] += then.error[k]
@@ -241,7 +242,8 @@ class GaussNewton:
         filtered, theta = errors.gradient.copy(), state.rls.theta
         for k, (d, a) in enumerate(self._slices(len(filtered))):
             for i, then in zip(range(d.start, d.stop), state.past, strict=False):
-                filtered[k] += theta[i] * then.errors[k] * ~np.isnan(then.target[k])
+                if then.target[k] == then.target[k]:
+                    filtered[k] += theta[i] * then.errors[k]
             for j, then in zip(range(a.start, a.stop), state.past, strict=False):
                 filtered[k] -= theta[j] * then.errors_filtered[k]
         return errors._replace(gradient=filtered)
