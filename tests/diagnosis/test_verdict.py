@@ -40,6 +40,8 @@ def ranked(effect: str, target: str, evidence: float, fitted: bool = True) -> Ra
 
 
 LEADER = ranked("coulomb_friction", "car_barrier", 50.0)
+BEYOND_DOUBT = replace(LEADER, evidence=1000.0)
+AS_MUCH = BEYOND_DOUBT, ranked("clearance", "engine", 960.0)
 EVIDENCE = Evidence(1, False, STANDS_STILL, left(0.2, 10.0, 0.5), left(0.05, 2.0), (LEADER,), True, True)
 
 MENDED = {"after": left(0.04, 0.5)}
@@ -65,6 +67,9 @@ LITTLE, DROWNED = left(0.009, 1.0), left(0.009, 0.13)
         ({"ranking": (LEADER, ranked("clearance", "engine", 45.0))}, DEFAULT, "unexplained", False),
         ({"ranking": (LEADER, ranked("clearance", "engine", 45.0, fitted=False))}, DEFAULT, "effect_missing", False),
         ({"ranking": (LEADER, ranked("viscous_damping", "car_barrier", 49.0))}, DEFAULT, "effect_missing", False),
+        ({"ranking": (BEYOND_DOUBT, ranked("clearance", "engine", 940.0))}, DEFAULT, "effect_missing", False),
+        ({"ranking": AS_MUCH}, DEFAULT, "unexplained", False),  # it explains 0.96 of what the first one does
+        ({"ranking": AS_MUCH, "white": True, "by_first": 0.96}, DEFAULT, "effect_missing", False),
         ({"white": True, "by_first": 0.96}, DEFAULT, "effect_missing", False),  # of little weight beside that
         ({"after": left(0.05, 6.0)}, DEFAULT, "unexplained", False),  # it explains two thirds
         ({"drift": VARIES, "after": left(0.009, 0.9)}, DEFAULT, "effect_missing", True),  # it explains 0.992

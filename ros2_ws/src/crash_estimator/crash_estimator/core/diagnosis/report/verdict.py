@@ -85,8 +85,10 @@ def _explains(evidence: Evidence) -> bool:
 
 def _beats_its_rivals(evidence: Evidence) -> bool:
     """The first candidate does, by evidence, all that were fitted but the same effect elsewhere and other laws of the
-    same place: what is missing is sure then, or where; these rivals are named."""
+    same place: what is missing is sure then, or where; these rivals are named. Where what is left is no noise, by a
+    share of it as well: that grows with what all of them explain, and says no more of which it is."""
     (first, *others), place_of = evidence.ranking, evidence.place_of
     elsewhere = [r for r in others if place_of(r.target) != place_of(first.target)]
-    unlike = [r.evidence for r in elsewhere if r.fitted and r.effect != first.effect]
-    return first.evidence > max(unlike, default=0.0) + THRESHOLDS.confounded
+    unlike = max((r.evidence for r in elsewhere if r.fitted and r.effect != first.effect), default=0.0)
+    as_much = not evidence.white and unlike > THRESHOLDS.all_but_folds * first.evidence
+    return first.evidence > unlike + THRESHOLDS.confounded and not as_much

@@ -87,7 +87,10 @@ class Thresholds(NamedTuple):
     share of what the best one takes away, from which a profile over a constant is looked at closer: four looked-at
     looks that led to the right answer took away more than the best one; not varied. And share of that from which
     another law on its target is fitted along the motion that it has found: of a looked-at force limiter whose fits had
-    ended at a kink, and that was told as hysteresis, it was 0.956; with 0.75 of 70 others none was told otherwise."""
+    ended at a kink, and that was told as hysteresis, it was 0.956; with 0.75 of 70 others none was told otherwise. And
+    share of the first one's evidence from which an unlike effect elsewhere explains as much, where what is left is no
+    noise: of a looked-at body that loses mass an unloading line was told, with 0.973; of 14 looked-at right answers
+    that leave more than noise and have such a rival among the best it was 0.938 and less."""
 
     # What is said, of what leaves more than noise
     most_at_once: int = 2
