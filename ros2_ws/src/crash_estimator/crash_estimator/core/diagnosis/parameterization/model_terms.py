@@ -10,9 +10,13 @@ from .magnitudes import Magnitudes
 
 def additions_of(magnitudes: Magnitudes, effects: Mapping[str, Effect]) -> tuple[Addition, ...]:
     """Raises ModelError where a model names an effect or a target that there is not."""
-    structure, line = magnitudes.structure, effects["plastic_unloading"]
+    structure = magnitudes.structure
     stated = [_addition(magnitudes, spec, effects) for spec in structure.effects]
-    return (*stated, *(Addition(line, e.name, coefficient=e.unloading_slope.value) for e in _open_lines(structure)))
+    lines = [
+        Addition(effects["plastic_unloading"], element.name, coefficient=element.unloading_slope.value)
+        for element in _open_lines(structure)
+    ]
+    return (*stated, *lines)
 
 
 def number_of_additions(structure: Structure) -> int:
