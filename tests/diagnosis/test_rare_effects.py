@@ -68,7 +68,7 @@ def test_a_spring_that_relaxes_within_two_milliseconds_is_no_damper():
     ("name", "effect", "other"),
     [
         ("single/plastic_unloading/1/2g/10000Hz/1.1/14000888", "plastic_unloading", "hysteresis"),
-        ("side/channel_delay/1/2g/10000Hz/1.1/14000676", "channel_delay", "clearance"),
+        ("side/channel_delay/1/2g/10000Hz/1.1/14000701", "channel_delay", "clearance"),
     ],
 )
 def test_what_no_screening_sees_is_among_the_rivals(name, effect, other):

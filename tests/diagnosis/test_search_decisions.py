@@ -199,6 +199,17 @@ def test_a_larger_noise_is_that_of_a_candidate_that_gains(monkeypatch):
     assert found.of == 300.0
 
 
+@pytest.mark.parametrize("astray", [True, False])
+def test_in_another_noise_a_model_starts_from_the_measured_motion_and_from_its_own_fit(monkeypatch, astray):
+    other, fit_there = "from its own", SimpleNamespace(cost=9.0, problem=SimpleNamespace(narrowed=lambda *given: given))
+    found = SimpleNamespace(fit=fit_there, refitted=lambda start, schedule, hopeless: (other, start, hopeless))
+    monkeypatch.setattr(selection_step, "fit_model", lambda magnitudes, records, additions: found)
+    monkeypatch.setattr(selection_step, "better", lambda one, than: astray and than is found)
+    before = SimpleNamespace(additions=(), fit=SimpleNamespace(layout="layout", point="point"))
+    told = selection_step._fitted_from_either(None, (), before)
+    assert told == ((other, ("layout", "point"), 9.0) if astray else found)
+
+
 @pytest.mark.parametrize(("changes", "gain", "fitted", "times"), [
     ((1.0, 0.06, 0.06), 500.0, True, 3), ((1.0, 0.04, 0.06), 500.0, True, 1), ((0.01, 0.04), 500.0, True, 1),
     ((1.0, 0.06, 0.06), 0.9 * THRESHOLDS.gain, True, 1), ((1.0, 0.06, 0.06), 500.0, False, 1),
@@ -212,13 +223,13 @@ def test_the_noise_is_taken_larger_until_it_stays_as_it_is(monkeypatch, changes,
         quietness -= changes[len(larger)]
         return (SimpleNamespace(whitener=np.exp(quietness / 2) * np.eye(2)),)
 
-    def refitted(magnitudes, records, additions):
+    def refitted(magnitudes, records, before):
         larger.append(records)
         return SimpleNamespace(**vars(model()) | {"records": records})
 
     monkeypatch.setattr(selection_step, "analyse", lambda fit: SimpleNamespace(white=False))
     monkeypatch.setattr(selection_step, "_noise_left_by", louder)
-    monkeypatch.setattr(selection_step, "fit_model", refitted)
+    monkeypatch.setattr(selection_step, "_fitted_from_either", refitted)
     found = [candidate(gain, fitted=fitted)]
     monkeypatch.setattr(selection_step, "fit_candidates", lambda *given, in_other_noise: ways.append("fitted") or found)
     monkeypatch.setattr(selection_step, "screen_candidates", lambda *given: ways.append("screened") or found)

@@ -9,11 +9,13 @@ import numpy as np
 from ...effects.effect import Addition, Effect
 from ..observation.noise_inflation import with_inflated_noise
 from ..observation.record import ObservedRecord
+from ..output_error.continuation import FROM_SIMULATION
 from ..output_error.gauss_newton import Fit, fit
 from ..output_error.normal_equations import may_diverge
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.in_band import band_of
 from ..residuals.residuals import analyse
+from .acceptance import better
 from .candidate_fits import CandidateFit, fit_candidates, screen_candidates
 from .even_fit import evenly_fitted
 from .fitted_model import Model, fit_model
@@ -87,7 +89,7 @@ def weighed(
         noisier = _noise_left_by(done, model.records)
         if larger and _as_loud(noisier, done.before.records):
             break
-        before = fit_model(magnitudes, noisier, model.additions)
+        before = _fitted_from_either(magnitudes, noisier, model)
         if before.white:  # so it looks; the sensors' own noise decides
             decided = analyse(fit(model.fit.problem, before.fit.point), sharply=True).band_test
             before = before._replace(residuals=before.residuals._replace(band_test=decided))
@@ -100,6 +102,14 @@ def weighed(
         done = SelectionStep(before, others, found, doubted=done.doubted)
     known = [evenly] if evenly else []
     return done._replace(evenly=evenly_fitted(done.before, band_of_steps([*path, done]), *known))
+
+
+def _fitted_from_either(magnitudes: Magnitudes, records: Sequence[ObservedRecord], model: Model) -> Model:
+    """The model in another noise, from the measured motion or from where its fit has ended, as either may go astray."""
+    found = fit_model(magnitudes, records, model.additions)
+    start = found.fit.problem.narrowed(model.fit.layout, model.fit.point)
+    other = found.refitted(start, FROM_SIMULATION, hopeless=found.fit.cost)
+    return other if better(other, found) else found
 
 
 def _noise_left_by(step: SelectionStep, records: Sequence[ObservedRecord]) -> tuple[ObservedRecord, ...]:
