@@ -5,6 +5,9 @@ from types import SimpleNamespace
 from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
 from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
 
+RARE = {"maxwell_element", "gas_cushion", "guide_friction", "force_offset"}
+"""Effects that are looked for last."""
+
 
 def model(left: float, additions: int = 0, evidence: float = 0.0) -> SimpleNamespace:
     """One that leaves a mean square of residuals, in the variance of the noise, with so many additions."""

@@ -118,11 +118,11 @@ class Thresholds(NamedTuple):
     side_mdb_door_car's unlike springs none for the right one."""
     few: int = 3
     """Of what is tried further: candidates that are fitted on by other schedules, or with a second one at once; bodies
-    that an unmodelled one may push; elements beside the one where an effect explains most; turns in which one of two
-    effects is sought anew; noises as large as what the best candidate leaves; and additions, as what takes more is not
-    told from a free curve that follows anything. With two candidates a Maxwell element was unexplained, by friction
-    with an unloading line; the third noise changed what leads in 4 of 53 looked-at steps. Four additions, in up to
-    211 looked-at cases, gave no better answer."""
+    that an unmodelled one may push; elements beside the one where an effect explains most, and those where a profile is
+    looked at though what leads acts on none; turns in which one of two effects is sought anew; noises as large as what
+    the best candidate leaves; and additions, as what takes more is not told from a free curve that follows anything.
+    With two candidates a Maxwell element was unexplained, by friction with an unloading line; the third noise changed
+    what leads in 4 of 53 looked-at steps. Four additions, in up to 211 looked-at cases, gave no better answer."""
     same_noise: float = 0.05
     """The noise is taken larger as long as the logarithm of its size, over all channels, changes by more: of 101
     looked-at steps in which it changed by less the third time, one was led by another candidate then, of two within

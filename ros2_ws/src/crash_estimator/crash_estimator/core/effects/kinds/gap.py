@@ -47,9 +47,9 @@ class Gap(Effect):
             for variant in self.variants:
                 largest = magnitudes.largest_crush(element.name, both_ways=variant == "play")
                 pulled = element.tension and low < -STARTS[0] * largest
-                if pulled if variant == "play" else high > 0.0:
-                    for share in STARTS:
-                        yield Addition(self, element.name, coefficient=share * largest, variant=variant)
+                shows = pulled if variant == "play" else high > 0.0
+                for share in STARTS if shows else ():
+                    yield Addition(self, element.name, coefficient=share * largest, variant=variant)
 
     def prior_std(self, magnitudes, addition):
         return TYPICAL * magnitudes.crush[magnitudes.element(addition.target)]
