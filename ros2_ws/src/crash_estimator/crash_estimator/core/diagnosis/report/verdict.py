@@ -58,9 +58,9 @@ def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
 
 
 def _stands_still(evidence: Evidence) -> bool:
-    """What is left does not go along with a mass, a force or a gain that varies with time: where it looks like noise,
-    as of a mimic, not at all, else not most of it; or it is of so little weight beside what one effect explains that it
-    may be the form of that."""
+    """What is left does not go along with a mass, a force, a stiffness or a gain that varies with time: where it looks
+    like noise, as of a mimic, not at all, else not most of it; or it is of so little weight beside what one effect
+    explains that it may be the form of that."""
     of_little_weight = evidence.by_first > THRESHOLDS.all_but_folds
     little_of_it = not evidence.white and evidence.drift.share < THRESHOLDS.leading_share
     return of_little_weight or evidence.drift.constant or little_of_it

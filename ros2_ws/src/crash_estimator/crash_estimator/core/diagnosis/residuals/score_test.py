@@ -1,10 +1,10 @@
 """Whether what a model leaves hangs on time: no effect of the vocabulary does, so that none of them explains it.
 
-A mass that grows, a push at some instant, a sensor that turns: two effects of the vocabulary can together come so close
-to one of these that their residual is white in every band. A score test (Rao 1948) looks where it would show. For each
-free body and each output let
+A mass that grows, a push at some instant, an element that breaks, a sensor that turns: two effects of the vocabulary
+can together come so close to one of these that their residual is white in every band. A score test (Rao 1948) looks
+where it would show. For each free body, each element and each output let
 
-    its mass be m (1 + s(t)),   a force s(t) push it,   its sensor show (1 + s(t)) a,
+    its mass be m (1 + s(t)),   a force s(t) push it,   its force be F (1 + s(t)),   its sensor show (1 + s(t)) a,
 
 s(t) = sum of c_j cos(j pi t / T), j = 1 ... MODES; one of these at a time. With the whitened outputs' derivative D by
 the c_j, J by the model's parameters, whose prior has the precision L about mu, their residual r, and H = J'J + L, where
@@ -13,6 +13,7 @@ all c_j are zero
     u = D'r - D'J H^-1 (J'r - L (theta - mu)),   S = D'D - D'J H^-1 J'D,   u' S^-1 u has chi^2 of MODES.
 """
 
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -62,6 +63,7 @@ def drift_of(fitted: Fit) -> Drift:
     free = np.array([k for k, kind in enumerate(layout.kind) if kind == FREE], int)  # none where all are driven
     names = [f"the mass of {layout.bodies[k]}" for k in free]
     names += [f"a force on {layout.bodies[k]}" for k in free]
+    names += [f"the stiffness of {link.name}" for link in layout.links]
     names += [f"the gain of {output.channel}" for output in layout.outputs]
     normal = _normal_equations(fitted, free)
     try:
@@ -102,13 +104,13 @@ def _statistic(score: np.ndarray, information: np.ndarray) -> tuple[float, int]:
 def _normal_equations(fitted: Fit, free: np.ndarray) -> Normal:
     """The fit's own, and after its parameters the directions of `drift_of`, in its order."""
     layout = fitted.layout
-    size = layout.size + (2 * len(free) + len(layout.outputs)) * MODES
+    size = layout.size + (2 * len(free) + len(layout.links) + len(layout.outputs)) * MODES
     matrix, vector, cost, samples = np.zeros((size, size)), np.zeros(size), 0.0, 0
     longest = max(float(record.time[-1]) for record in fitted.problem.records)
     for experiment, trajectory in zip(fitted.problem.experiments, fitted.trajectories, strict=True):
         modes = np.cos(np.pi * np.arange(1, MODES + 1) * (experiment.record.time / longest)[:, None])
         equations = linearise(experiment, fitted.theta, trajectory)
-        equations = _with_motion(equations, modes, free, layout.size)
+        equations = _with_motion(equations, _accelerated(equations, free), modes.T, layout.size)
         out = whitened(experiment, fitted.theta, trajectory, equations, in_time=False)
         flat = np.concatenate([out, _of_sensors(experiment, fitted.theta, trajectory, equations, modes)], axis=2)
         flat = flat.reshape(-1, flat.shape[-1])
@@ -121,21 +123,32 @@ def _normal_equations(fitted: Fit, free: np.ndarray) -> Normal:
     return Normal(matrix, vector, cost, samples, 0.0)
 
 
-def _with_motion(equations: Equations, modes: np.ndarray, free: np.ndarray, first: int) -> Equations:
-    """With one more column for each mode of each free body's mass, then of the force on it; modes (g, MODES)."""
-    linear, rows = equations.linear, equations.rows[:, free].T
-    acts = np.concatenate([-rows, np.repeat(np.abs(rows).max(axis=1, keepdims=True), len(modes), axis=1)])
-    acts = (acts[:, None] * modes.T).reshape(-1, len(modes))
-    more, others = np.arange(len(acts)), linear.others
+def _accelerated(equations: Equations, free: np.ndarray) -> list[dict[int, np.ndarray]]:
+    """What each mass, each force on a body and each element accelerates, where s is one: (g,) by body; of a fixed one
+    the force on it."""
+    rows, inverse = equations.rows, equations.linear.inverse_mass
+    masses = [{k: -rows[:, k]} for k in free]
+    forces = [{k: np.full(len(rows), np.abs(rows[:, k]).max())} for k in free]
+    pairs = zip(equations.linear.ends.tolist(), equations.links, strict=True)
+    elements = [{a: -inverse[a] * link.force, b: inverse[b] * link.force} for (a, b), link in pairs]
+    return [*masses, *forces, *elements]
+
+
+def _with_motion(
+    equations: Equations, accelerated: Sequence[Mapping[int, np.ndarray]], modes: np.ndarray, first: int
+) -> Equations:
+    """With a column more for each mode (MODES, g) of each of those; first: parameter of the first such column."""
+    linear, others = equations.linear, equations.linear.others
+    more = np.arange(len(accelerated) * MODES)
+    acting = [(n, body, values) for n, bodies in enumerate(accelerated) for body, values in bodies.items()]
     wider = linear._replace(
-        start=np.pad(linear.start, ((0, 0), (0, 0), (0, len(acts)))),
-        others=others + len(acts),
-        column=np.concatenate([linear.column, others + more]),
-        body=np.concatenate([linear.body, np.tile(np.repeat(free, MODES), 2)]),
-        acts=np.concatenate([linear.acts, acts]),
+        start=np.pad(linear.start, ((0, 0), (0, 0), (0, len(more)))),
+        others=others + len(more),
+        column=np.concatenate([linear.column, *(others + more[n * MODES :][:MODES] for n, _, _ in acting)]),
+        body=np.concatenate([linear.body, np.repeat([body for _, body, _ in acting], MODES)]),
+        acts=np.concatenate([linear.acts, *(values * modes for _, _, values in acting)]),
     )
-    columns = np.insert(equations.columns, others - 1, first + more)
-    return equations._replace(linear=wider, columns=columns)
+    return equations._replace(linear=wider, columns=np.insert(equations.columns, others - 1, first + more))
 
 
 def _of_sensors(
