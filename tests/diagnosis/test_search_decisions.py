@@ -137,7 +137,7 @@ def test_a_further_step_goes_on_only_where_a_candidate_explains_more_than_too_li
     monkeypatch.setattr(forward_selection, "is_rare", lambda addition: False)
     monkeypatch.setattr(forward_selection, "band_of_steps", lambda steps: None)
     monkeypatch.setattr(forward_selection, "as_fitted", lambda before, one: one.gain)
-    little = lambda before, gain, band: gain < THRESHOLDS.least_share  # noqa: E731
+    little = lambda before, gain, band: gain < THRESHOLDS.some  # noqa: E731
     monkeypatch.setattr(forward_selection, "explains_too_little", little)
     found = forward_selection._next_step(None, {}, model(additions=("one",)), ["the first step"])
     assert found == (step if believed else "screened")
@@ -240,10 +240,10 @@ def test_the_noise_is_taken_larger_until_it_stays_as_it_is(monkeypatch, changes,
 
 
 @pytest.mark.parametrize(("added", "share"), [
-    ([], THRESHOLDS.named_share), (["hysteresis"], THRESHOLDS.all_but_folds),
-    (["coulomb_friction", "hysteresis"], THRESHOLDS.named_share),
-    (["yielding"], THRESHOLDS.all_but_folds), (["coulomb_friction", "yielding"], THRESHOLDS.all_but_folds),
-    (["bottoming_out"], THRESHOLDS.all_but_folds), (["clearance"], THRESHOLDS.named_share),
+    ([], THRESHOLDS.most), (["hysteresis"], THRESHOLDS.nearly_all),
+    (["coulomb_friction", "hysteresis"], THRESHOLDS.most),
+    (["yielding"], THRESHOLDS.nearly_all), (["coulomb_friction", "yielding"], THRESHOLDS.nearly_all),
+    (["bottoming_out"], THRESHOLDS.nearly_all), (["clearance"], THRESHOLDS.most),
     (["bottoming_out", "yielding"], 1.0),
 ])  # fmt: skip
 def test_a_curve_or_a_law_with_two_constants_must_explain_nearly_all(added, share):

@@ -159,7 +159,7 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
         moved = time_zero_step(zero, models[0], (runs[0], runs[1]))
         models, reports = (given, *models), (moved, *effects_added)
         ranking = ranking if added else (as_ranked(moved), *ranking)
-    weighed = final.fit.problem.noise_is_inflated or after.share_explained(before) > THRESHOLDS.all_but_folds
+    weighed = final.fit.problem.noise_is_inflated or after.share_explained(before) > THRESHOLDS.nearly_all
     certain = all(abs(one.coefficient) > one.std for one in reports)
     many = len(added) or len(reports)  # a time zero is none of the effects that may be too many
     needed = needed_share(added)

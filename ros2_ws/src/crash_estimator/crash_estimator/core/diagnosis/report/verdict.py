@@ -24,7 +24,7 @@ class Evidence(NamedTuple):
     weighed: bool  # the evidence was taken in a noise as large as what is left
     certain: bool  # every coefficient that was added is beyond its standard deviation
     by_first: float = 0.0  # share of the misfit in the band that the first effect explains, wherever it is missing
-    needed: float = THRESHOLDS.named_share  # share that all of them must explain
+    needed: float = THRESHOLDS.most  # share that all of them must explain
     place_of: Callable[[str], Hashable] = str  # what two targets have in common that are the same place
     assumed: bool = False  # the noise is, of some channel: to be less than it says little
 
@@ -61,8 +61,8 @@ def _stands_still(evidence: Evidence) -> bool:
     """What is left does not go along with a mass, a force, a stiffness or a gain that varies with time: where it looks
     like noise, as of a mimic, not at all, else not most of it; or it is of so little weight beside what one effect
     explains that it may be the form of that."""
-    of_little_weight = evidence.by_first > THRESHOLDS.all_but_folds
-    little_of_it = not evidence.white and evidence.drift.share < THRESHOLDS.leading_share
+    of_little_weight = evidence.by_first > THRESHOLDS.nearly_all
+    little_of_it = not evidence.white and evidence.drift.share < THRESHOLDS.half
     return of_little_weight or evidence.drift.constant or little_of_it
 
 
@@ -70,7 +70,9 @@ def _leaves_next_to_nothing(evidence: Evidence, within: bool) -> bool:
     """One effect leaves so little, beside the noise or the tolerance too, that what varies with time in it is no other
     explanation."""
     little = within or evidence.after.is_less_than_noise
-    return evidence.added == 1 and little and evidence.after.share_explained(evidence.before) > THRESHOLDS.nearly_all
+    return (
+        evidence.added == 1 and little and evidence.after.share_explained(evidence.before) > THRESHOLDS.practically_all
+    )
 
 
 def _explains(evidence: Evidence) -> bool:
@@ -90,5 +92,5 @@ def _beats_its_rivals(evidence: Evidence) -> bool:
     (first, *others), place_of = evidence.ranking, evidence.place_of
     elsewhere = [r for r in others if place_of(r.target) != place_of(first.target)]
     unlike = max((r.evidence for r in elsewhere if r.fitted and r.effect != first.effect), default=0.0)
-    as_much = not evidence.white and unlike > THRESHOLDS.all_but_folds * first.evidence
+    as_much = not evidence.white and unlike > THRESHOLDS.nearly_all * first.evidence
     return first.evidence > unlike + THRESHOLDS.confounded and not as_much

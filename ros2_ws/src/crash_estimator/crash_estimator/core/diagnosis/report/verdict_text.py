@@ -115,7 +115,7 @@ def _unexplained(evidence: Evidence, steps, first: Model, final: Model, floor: f
     )
     done = f"{names} {'explains' if len(steps) == 1 else 'explain'} part of it; " if steps else ""
     left = f"no candidate explains what is left, most of it in {where}"
-    varies = drift.share > THRESHOLDS.least_share and not drift.constant
+    varies = drift.share > THRESHOLDS.some and not drift.constant
     also = f"; {drift.share:.0%} of it goes along with {along}" if varies else ""
     return f"{done}{size}; {left}{also}"
 

@@ -60,7 +60,7 @@ def explains_too_little(before, after, cfc: int | None) -> bool:
 
     before, after: the model (a `Model` each) without it and with it, as their errors are told; cfc: the band's class.
     """
-    return share_explained(before, after, cfc) < THRESHOLDS.least_share
+    return share_explained(before, after, cfc) < THRESHOLDS.some
 
 
 def share_explained(before, after, cfc: int | None) -> float:
@@ -87,4 +87,4 @@ def needed_share(added: Sequence[Addition]) -> float:
     if len(set(curves)) < len(curves):
         return 1.0
     two_shapes = any(len(one.effect.shapes_of(one.variant)) > 1 for one in added[:1])
-    return THRESHOLDS.all_but_folds if curves or two_shapes else THRESHOLDS.named_share
+    return THRESHOLDS.nearly_all if curves or two_shapes else THRESHOLDS.most

@@ -114,7 +114,7 @@ class _Search:
         from what they are, as what is missing has bent them."""
         if by_motion and self.model.fit.layout.stated and not search_is_over():
             one = by_motion[0]
-            falls_short = self.found[one.addition.key].gain < THRESHOLDS.leading_share * one.gain
+            falls_short = self.found[one.addition.key].gain < THRESHOLDS.half * one.gain
             if falls_short and one.gain > self.ranking()[0].gain:
                 self._note(one.addition, fit(self._untrusting(one.addition)))
 
@@ -174,9 +174,9 @@ class _Search:
         lacks, gained = self.model.fit.cost, self.model.fit.cost - self.least
         look = profile(
             self._problem(starts[0]), starts[0], [addition.coefficient for addition in starts],
-            SMALL_STEPS if followed else FROM_MEASURED_MOTION, hopeless=lacks - THRESHOLDS.named_share * gained,
+            SMALL_STEPS if followed else FROM_MEASURED_MOTION, hopeless=lacks - THRESHOLDS.most * gained,
         )  # fmt: skip
-        if lacks - look.fit.cost > THRESHOLDS.all_but_folds * gained:
+        if lacks - look.fit.cost > THRESHOLDS.nearly_all * gained:
             self._note(look.addition, closer(look))
 
     def hardly_screened(self) -> None:
@@ -192,7 +192,7 @@ class _Search:
         """Fit other laws on the same target along the motion that the best one has found: as that leaves only noise,
         another one that is as good is near its own best there, however the usual fits were led astray."""
         best, *others = [one for one in self.ranking() if one.fit]
-        near = self.model.fit.cost - THRESHOLDS.all_but_folds * (self.model.fit.cost - best.fit.cost)
+        near = self.model.fit.cost - THRESHOLDS.nearly_all * (self.model.fit.cost - best.fit.cost)
         rivals = [o for o in others if o.addition.target == best.addition.target and o.fit.cost < near]
         laws = {(one.addition.key, one.addition.variant): one.fit.cost for one in rivals}
         for addition in (one.addition for one in self.screened):
@@ -243,7 +243,7 @@ class _Search:
 
     def explains_most(self) -> bool:
         """The best so far takes a large share of the misfit away."""
-        return self.least < (1.0 - THRESHOLDS.named_share) * self.model.fit.cost
+        return self.least < (1.0 - THRESHOLDS.most) * self.model.fit.cost
 
     def out_of_reach(self) -> bool:
         """What is left is so much more than noise that nothing makes noise of it."""

@@ -46,7 +46,7 @@ def promised_by(other: Structure, path: SelectionPath, likely: Iterable[tuple[Se
         otherwise = _fitted_slowly(magnitudes, records, additions, path.furthest.cost + THRESHOLDS.hopeless)
         misfit = 0.5 * max(as_recorded.cost - cost_of_noise(records), 0.0)  # nats
         # what stays behind the best of all must gain most of what it lacked
-        share = THRESHOLDS.least_share if otherwise.evidence > first else THRESHOLDS.leading_share
+        share = THRESHOLDS.some if otherwise.evidence > first else THRESHOLDS.half
         if otherwise.evidence > as_recorded.evidence + THRESHOLDS.gain + share * misfit:
             most = max(most, otherwise.evidence)
     if final.white and len(path.added) <= THRESHOLDS.most_at_once:
@@ -73,7 +73,7 @@ def likely_first(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]
     magnitudes = measure_magnitudes(path.structure, path.records, path.cells)
     fitted = [*first.doubted, *(one for one in first.as_recorded if one.fit)]
     if path.final.white:
-        fitted = [one for one in fitted if one.gain > (1.0 - THRESHOLDS.least_share) * fitted[0].gain]
+        fitted = [one for one in fitted if one.gain > (1.0 - THRESHOLDS.some) * fitted[0].gain]
     hopeless = path.furthest.cost + THRESHOLDS.hopeless
     for one in fitted:  # from where it began: what it has come to may be what made up for the contact
         yield (*first.before.additions, one.addition), one.fit

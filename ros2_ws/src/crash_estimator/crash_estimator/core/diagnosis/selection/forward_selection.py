@@ -36,7 +36,7 @@ def forward_selection(
     path, final = _from_two(magnitudes, effects, begun) if begun else _one_by_one(magnitudes, effects, given, [], first)
     if others := replaced(magnitudes, effects, given, path, final):
         return _from_two(magnitudes, effects, others)
-    next_to_nothing = begun or share_removed(given.residuals, final.residuals) > THRESHOLDS.all_but_folds
+    next_to_nothing = begun or share_removed(given.residuals, final.residuals) > THRESHOLDS.nearly_all
     if final.white or next_to_nothing or search_is_over():
         return path, final
     firsts = [*first.doubted[:1], *first.as_recorded]
@@ -101,7 +101,7 @@ def _followed(path: Sequence[SelectionStep]) -> tuple[str, str] | None:
 def _explains_nearly_all(step: SelectionStep) -> bool:
     """The best candidate does: what it leaves may be of another kind as well as of its own."""
     left = step.best and share_removed(step.before.residuals, analyse(step.best.fit))
-    return bool(left and left > THRESHOLDS.all_but_folds)
+    return bool(left and left > THRESHOLDS.nearly_all)
 
 
 def _none_leads(step: SelectionStep) -> bool:
@@ -111,7 +111,7 @@ def _none_leads(step: SelectionStep) -> bool:
     if step.leaves_noise or not far:
         return False
     fitted = (as_fitted(before, one) for one in step.candidates if one.fit)
-    return all(share_explained(before, larger, band) < THRESHOLDS.leading_share for larger in fitted)
+    return all(share_explained(before, larger, band) < THRESHOLDS.half for larger in fitted)
 
 
 def _next_step(

@@ -151,7 +151,7 @@ class _Search:
         likely = ((*given, one.addition) for one in (*fitted, *first.doubted[: THRESHOLDS.few]))
         models = (given, path.final.additions, *likely)
         magnitudes = measure_magnitudes(path.structure, self.coasting_records, path.cells)
-        next_to_nothing = (1.0 - THRESHOLDS.all_but_folds) * path.as_recorded.cost
+        next_to_nothing = (1.0 - THRESHOLDS.nearly_all) * path.as_recorded.cost
         most = max(THRESHOLDS.near_floor * cost_of_noise(self.coasting_records), next_to_nothing)
         problems = (make_problem(magnitudes, self.coasting_records, additions) for additions in models)
         return any(fit(problem, hopeless=most).cost < most for problem in problems)
@@ -218,5 +218,5 @@ def _better(one: SelectionPath, other: SelectionPath) -> bool:
     if other.final.white:  # what varies with time in what looks like noise is no matter of when that begins
         return False
     left = _left_by(other)
-    least = THRESHOLDS.all_but_folds if left.mean_square >= THRESHOLDS.real_structure else THRESHOLDS.least_share
+    least = THRESHOLDS.nearly_all if left.mean_square >= THRESHOLDS.real_structure else THRESHOLDS.some
     return len(one.added) <= max(len(other.added), 1) and share_removed(left, _left_by(one)) > least

@@ -32,7 +32,7 @@ def two_at_once(
     """
     found = [
         *_one_after_the_other(magnitudes, effects, model, candidates, followed),
-        *(pair for pair in alike if pair.model.white or _all_but_folds(model, pair)),
+        *(pair for pair in alike if pair.model.white or _removes_nearly_all(model, pair)),
     ]
     return max(found, key=lambda pair: (pair.model.white, pair.model.fit.evidence), default=None)
 
@@ -80,8 +80,8 @@ def near_the_floor(pairs: Sequence[Pair], candidates: Sequence[CandidateFit]) ->
     return best if leaves_less and best.model.residuals.mean_square < THRESHOLDS.near_floor else None
 
 
-def _all_but_folds(model: Model, pair: Pair) -> bool:
-    return share_removed(model.residuals, pair.model.residuals) > THRESHOLDS.all_but_folds
+def _removes_nearly_all(model: Model, pair: Pair) -> bool:
+    return share_removed(model.residuals, pair.model.residuals) > THRESHOLDS.nearly_all
 
 
 def likely(candidates: Sequence[CandidateFit]) -> list[CandidateFit]:

@@ -112,7 +112,7 @@ def _leaving_less(step: SelectionStep, cost: float) -> list[CandidateFit]:
 def _leaves_next_to_nothing(step: SelectionStep) -> bool:
     """The best leaves less than the noise again, of much more: the rest may be the form of its law."""
     near = _near_the_floor(step)
-    return near and share_removed(step.before.residuals, analyse(step.best.fit)) > THRESHOLDS.all_but_folds
+    return near and share_removed(step.before.residuals, analyse(step.best.fit)) > THRESHOLDS.nearly_all
 
 
 def _comes_near(step: SelectionStep, rare: SelectionStep) -> bool:
@@ -120,10 +120,10 @@ def _comes_near(step: SelectionStep, rare: SelectionStep) -> bool:
     which the rare one explains as much as is asked of what is named."""
     if not _near_the_floor(step):
         return False
-    next_to_none = analyse(step.best.fit).mean_square < 1.0 + THRESHOLDS.least_share
+    next_to_none = analyse(step.best.fit).mean_square < 1.0 + THRESHOLDS.some
     noise = cost_of_noise(step.before.records)
     left, by_rare = (one.best.fit.cost - noise for one in (step, rare))
-    return next_to_none or left - by_rare < THRESHOLDS.named_share * left
+    return next_to_none or left - by_rare < THRESHOLDS.most * left
 
 
 def _near_the_floor(step: SelectionStep) -> bool:

@@ -52,7 +52,7 @@ def first_believed(path: SelectionPath) -> SelectionPath:
     if len(path.added) <= most:
         return path
     final = path.steps[most].before
-    if path.final.white and share_removed(path.steps[0].before.residuals, final.residuals) < THRESHOLDS.all_but_folds:
+    if path.final.white and share_removed(path.steps[0].before.residuals, final.residuals) < THRESHOLDS.nearly_all:
         return path
     return up_to(path, most)
 

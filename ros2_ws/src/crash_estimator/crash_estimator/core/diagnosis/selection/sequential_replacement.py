@@ -78,4 +78,4 @@ def _two_that_explain_most(path: Sequence[SelectionStep], final: Model) -> Seque
 def _leaves_next_to_nothing(found: Model, both: Model) -> bool:
     """Less than the noise again, of what was left by those found one by one: the rest may be the form of a law."""
     near = both.residuals.mean_square < THRESHOLDS.near_floor
-    return near and share_removed(found.residuals, both.residuals) > THRESHOLDS.all_but_folds
+    return near and share_removed(found.residuals, both.residuals) > THRESHOLDS.nearly_all
