@@ -3,10 +3,12 @@
 What is found does not depend on the stated time zero.
 
 1. Noise. Each acceleration and force has its mean and standard deviation from the record's first samples, at rest;
-   noise whose neighbours are alike counts for as much less, by how means of RUN scatter there. A car that rolls
+   noise whose neighbours are alike counts for as much less, by how means over a run scatter there. A car that rolls
    towards its barrier shakes more than it did at first: no mean is known better than SHAKES of the channel's peak.
-2. Alarm. The first instant at which the mean over RUN of any channel leaves its rest by more than ALARM standard
-   deviations of such means, HOLDS for as long again, and is followed by another channel's within BACK.
+2. Alarm. The first instant at which the mean over a run of RUNS of any channel leaves its rest by more than ALARM
+   standard deviations of such means, HOLDS for as long again, and is followed by another channel's, within BACK or
+   while it stays away. The shortest run tells a steep rise. A rise that takes its time to get out of the noise is told
+   by the run that has ended first, and known no better than by the length of that.
 3. Change point. Around the alarm, for every instant k: before k a channel is at rest, from k on it follows
    b0 + b1 (t - t_k) + b2 (t - t_k)^2, with its own coefficients by least squares. Onset is the k with the smallest sum
    of squared residuals, in units of the channels' noise, over all channels that have woken by the end of the window:
@@ -16,6 +18,7 @@ A jump is found to the sample; a rise out of the noise as precisely as its slope
 well (AS_WELL) say how precisely.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -29,8 +32,9 @@ AT_REST = 0.010
 """s of the record's beginning that tell the noise; a record that has less before the impact has no onset to find."""
 LEAST_AT_REST = 40
 """Samples: their standard deviation is known to a tenth."""
-RUN, LEAST_RUN = 0.0005, 5
-"""s, and samples, of the means that are watched: shorter than the rise of any structure, longer than a spike."""
+RUNS, LEAST_RUN = (0.0005, 0.001, 0.002, 0.004), 5
+"""s, and samples, of the means that are watched: the first is shorter than the rise of any stiff structure and longer
+than a spike; the last is as long as AT_REST tells the scatter of, and knows a rise of 1 g/ms in a noise of 2 g."""
 ALARM, HOLDS = 8.0, 2
 """Standard deviations, which white noise does not reach in any record, and runs that a spike does not last."""
 SHAKES = 0.00125
@@ -54,36 +58,72 @@ class Onset(NamedTuple):
     differs: bool  # from the stated time zero by more than it can be wrong
 
 
+class _Alarm(NamedTuple):
+    """What means over one run say."""
+
+    run: int  # samples
+    first: int  # sample with which the first run begins that is away
+    woken: tuple[int, ...]  # channels that are soon after it
+    columns: Mapping[int, np.ndarray]  # by channel, (n,) in units of its noise
+    gentle: bool = False  # the rise takes its time to get out of the noise, and need not be the parabola that is fitted
+
+
 def find_onset(recording: Recording) -> Onset | None:
     """The instant at which the impact begins; None where nothing rests at first, or nothing wakes."""
     period = recording.sample_period
     quiet = max(LEAST_AT_REST, round(AT_REST / period)) if period else 0
     if not quiet or len(recording) < 2 * quiet + LEAST_AHEAD:
         return None
-    run = max(LEAST_RUN, round(RUN / period))
-    names, columns, alarms = [], [], []
-    for channel, values in zip(recording.test.channels, recording.values.T):
+    alarm = _first_alarm(recording, quiet, period)
+    if alarm is None:
+        return None
+    back, ahead = _around(alarm.run, period)
+    start = max(quiet // 2, alarm.first - back)
+    candidates = np.arange(start, min(alarm.first + alarm.run, len(recording) - LEAST_RUN))
+    columns = np.array([alarm.columns[k] for k in alarm.woken])
+    costs = _change_costs(columns, candidates, min(alarm.first + ahead, len(recording)))
+    sample = int(candidates[np.argmin(costs)])
+    almost = candidates[costs <= costs.min() + AS_WELL]
+    time_ns = int(recording.time_ns[sample])
+    precision = int(max(np.abs(recording.time_ns[almost] - time_ns).max(), alarm.gentle * alarm.run * period * 1e9))
+    differs = abs(time_ns) > max(DIFFERS * period * 1e9 + 1.0, precision)
+    return Onset(time_ns, sample, tuple(recording.test.channels[k].name for k in alarm.woken), precision, differs)
+
+
+def _first_alarm(recording: Recording, quiet: int, period: float) -> _Alarm | None:
+    """Of the shortest run, or of the one that has ended first, where that is before most of what the shortest one's
+    change point would be sought in."""
+    runs = sorted({max(LEAST_RUN, round(seconds / period)) for seconds in RUNS})
+    alarms = [alarm for run in runs if (alarm := _alarm_by(run, recording, quiet))]
+    if not alarms:
+        return None
+    steep, earliest = alarms[0], min(alarms, key=lambda alarm: alarm.first + alarm.run)
+    if earliest.first + earliest.run < steep.first - round(BACK / period) // 2:
+        return earliest._replace(gentle=True)
+    return steep
+
+
+def _around(run: int, period: float) -> tuple[int, int]:
+    """Samples before and after an alarm in which the change point is sought: two runs, and one, of the longer ones."""
+    return max(round(BACK / period), 2 * run), max(LEAST_AHEAD, round(AHEAD / period), run)
+
+
+def _alarm_by(run: int, recording: Recording, quiet: int) -> _Alarm | None:
+    """None where no channel rests at first and wakes."""
+    columns, away = {}, {}
+    for k, (channel, values) in enumerate(zip(recording.test.channels, recording.values.T, strict=True)):
         if channel.quantity not in RESTS_AT_ZERO or not np.isfinite(values[:quiet]).all():
             continue
         column = _in_its_noise(values, quiet, run)
         if column is not None:
-            names.append(channel.name)
-            columns.append(column)
-            alarms.append(_alarm(column, quiet, run))
-    if not any(alarms):
+            mean = np.convolve(column, np.full(run, 1.0 / run), mode="valid") * np.sqrt(run)
+            columns[k], away[k] = column, np.abs(mean) > ALARM
+    alarms = {k: alarm for k in away if (alarm := _first_to_stay(away[k], quiet, run))}
+    if not alarms:
         return None
-    first = _first_with_a_witness([alarm for alarm in alarms if alarm], round(BACK / period))
-    ahead = max(LEAST_AHEAD, round(AHEAD / period))
-    woken = [k for k, alarm in enumerate(alarms) if alarm and first <= alarm <= first + ahead]
-    start = max(quiet // 2, first - round(BACK / period))
-    candidates = np.arange(start, min(first + run, len(recording) - LEAST_RUN))
-    costs = _change_costs(np.array([columns[k] for k in woken]), candidates, min(first + ahead, len(recording)))
-    sample = int(candidates[np.argmin(costs)])
-    almost = candidates[costs <= costs.min() + AS_WELL]
-    time_ns = int(recording.time_ns[sample])
-    precision = int(np.abs(recording.time_ns[almost] - time_ns).max())
-    differs = abs(time_ns) > max(DIFFERS * period * 1e9 + 1.0, precision)
-    return Onset(time_ns, sample, tuple(names[k] for k in woken), precision, differs)
+    back, ahead = _around(run, recording.sample_period)
+    first = _first_with_a_witness(alarms, away, back)
+    return _Alarm(run, first, tuple(k for k, alarm in alarms.items() if first <= alarm <= first + ahead), columns)
 
 
 def _in_its_noise(values: np.ndarray, quiet: int, run: int) -> np.ndarray | None:
@@ -98,21 +138,22 @@ def _in_its_noise(values: np.ndarray, quiet: int, run: int) -> np.ndarray | None
     return moved / max(sigma, np.sqrt(run) * scatter)  # the second is the first where the noise is white
 
 
-def _alarm(column: np.ndarray, quiet: int, run: int) -> int:
+def _first_to_stay(away: np.ndarray, quiet: int, run: int) -> int:
     """Index of the first sample of the first run that leaves its rest and stays away; 0 for none."""
-    mean = np.convolve(column, np.full(run, 1.0 / run), mode="valid") * np.sqrt(run)
-    away = np.abs(mean) > ALARM
     for k in np.flatnonzero(away[quiet:]) + quiet:
         if away[k : k + HOLDS * run].all():
             return int(k)
     return 0
 
 
-def _first_with_a_witness(alarms: list[int], within: int) -> int:
-    """The first alarm that another one's follows soon: before an impact a head turns, or a cable moves, alone."""
-    alarms = sorted(alarms)
-    followed = (one for one, other in pairwise(alarms) if other - one <= within)
-    return next(followed, alarms[0])
+def _first_with_a_witness(alarms: Mapping[int, int], away: Mapping[int, np.ndarray], within: int) -> int:
+    """The first alarm that another one's follows, soon or while it stays away: before an impact a head turns, or a
+    cable moves, alone."""
+    ordered = sorted((alarm, channel) for channel, alarm in alarms.items())
+    for (one, channel), (other, _) in pairwise(ordered):
+        if other - one <= within or away[channel][one:other].all():
+            return one
+    return ordered[0][0]
 
 
 def _change_costs(columns: np.ndarray, candidates: np.ndarray, end: int) -> np.ndarray:
