@@ -35,13 +35,15 @@ def left(of_peak: float, rms: float, rating: float | None = 0.9) -> Left:
     return Left(rms, 0.1, 0.0, 60, (ChannelLeft("car_ax", "test", rms, "m/s^2", of_peak, rating),))
 
 
-def ranked(effect: str, target: str, evidence: float, fitted: bool = True) -> Ranked:
-    return Ranked(effect, target, 1.0, 0.1, "N", evidence, 0.9, True, (), fitted=fitted)
+def ranked(effect: str, target: str, evidence: float, explained: float = 0.1, fitted: bool = True) -> Ranked:
+    return Ranked(effect, target, 1.0, 0.1, "N", evidence, explained, True, (), fitted=fitted)
 
 
-LEADER = ranked("coulomb_friction", "car_barrier", 50.0)
+LEADER = ranked("coulomb_friction", "car_barrier", 50.0, explained=0.9)
 BEYOND_DOUBT = replace(LEADER, evidence=1000.0)
-AS_MUCH = BEYOND_DOUBT, ranked("clearance", "engine", 960.0)
+HARDLY_MORE = BEYOND_DOUBT, ranked("clearance", "engine", 960.0, explained=0.86)
+HALF_AS_MUCH_AGAIN = BEYOND_DOUBT, ranked("clearance", "engine", 960.0, explained=0.84)
+LESS_LIKELY = BEYOND_DOUBT, ranked("clearance", "engine", 940.0, explained=0.86)
 EVIDENCE = Evidence(1, False, STANDS_STILL, left(0.2, 10.0, 0.5), left(0.05, 2.0), (LEADER,), True, True)
 
 MENDED = {"after": left(0.04, 0.5)}
@@ -67,9 +69,10 @@ LITTLE, DROWNED = left(0.009, 1.0), left(0.009, 0.13)
         ({"ranking": (LEADER, ranked("clearance", "engine", 45.0))}, DEFAULT, "unexplained", False),
         ({"ranking": (LEADER, ranked("clearance", "engine", 45.0, fitted=False))}, DEFAULT, "effect_missing", False),
         ({"ranking": (LEADER, ranked("viscous_damping", "car_barrier", 49.0))}, DEFAULT, "effect_missing", False),
-        ({"ranking": (BEYOND_DOUBT, ranked("clearance", "engine", 940.0))}, DEFAULT, "effect_missing", False),
-        ({"ranking": AS_MUCH}, DEFAULT, "unexplained", False),  # it explains 0.96 of what the first one does
-        ({"ranking": AS_MUCH, "white": True, "by_first": 0.96}, DEFAULT, "effect_missing", False),
+        ({"ranking": HARDLY_MORE}, DEFAULT, "unexplained", False),  # is left by another one elsewhere
+        ({"ranking": HALF_AS_MUCH_AGAIN}, DEFAULT, "effect_missing", False),
+        ({"ranking": LESS_LIKELY}, DEFAULT, "effect_missing", False),
+        ({"ranking": HARDLY_MORE, "white": True, "by_first": 0.96}, DEFAULT, "effect_missing", False),
         ({"white": True, "by_first": 0.96}, DEFAULT, "effect_missing", False),  # of little weight beside that
         ({"after": left(0.05, 6.0)}, DEFAULT, "unexplained", False),  # it explains two thirds
         ({"drift": VARIES, "after": left(0.009, 0.9)}, DEFAULT, "effect_missing", True),  # it explains 0.992

@@ -43,6 +43,11 @@ class Ranked:
     def name(self) -> str:
         return f"{self.effect} on {self.target}"
 
+    @property
+    def left(self) -> float:
+        """Share of the residual's variance."""
+        return 1.0 - self.explained
+
     def as_json(self) -> dict:
         return vars(self) | {"confounded_with": list(self.confounded_with)}
 

@@ -87,10 +87,13 @@ def _explains(evidence: Evidence) -> bool:
 
 def _beats_its_rivals(evidence: Evidence) -> bool:
     """The first candidate does, by evidence, all that were fitted but the same effect elsewhere and other laws of the
-    same place: what is missing is sure then, or where; these rivals are named. Where what is left is no noise, by a
-    share of it as well: that grows with what all of them explain, and says no more of which it is."""
+    same place: what is missing is sure then, or where; these rivals are named. Where what is left is no noise, none of
+    them may explain nearly as much and leave hardly more, either: evidence grows with what all of them explain, and
+    says no more of which it is."""
     (first, *others), place_of = evidence.ranking, evidence.place_of
-    elsewhere = [r for r in others if place_of(r.target) != place_of(first.target)]
-    unlike = max((r.evidence for r in elsewhere if r.fitted and r.effect != first.effect), default=0.0)
-    as_much = not evidence.white and unlike > THRESHOLDS.nearly_all * first.evidence
-    return first.evidence > unlike + THRESHOLDS.confounded and not as_much
+    elsewhere = [r for r in others if r.fitted and place_of(r.target) != place_of(first.target)]
+    unlike = [r for r in elsewhere if r.effect != first.effect]
+    as_much = [r for r in unlike if r.evidence > THRESHOLDS.nearly_all * first.evidence]
+    if not evidence.white and any(r.left < (1.0 + THRESHOLDS.half) * first.left for r in as_much):
+        return False
+    return all(first.evidence > r.evidence + THRESHOLDS.confounded for r in unlike)
