@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
 
 from crash_replay.recording import Recording
 
@@ -12,6 +14,7 @@ from ...sensor_faults import without_faults
 from ...sensor_noise import ASSUMED
 from ...structure import ModelError, Structure
 from ..observation.record import refuse_dead_channels
+from ..output_error.gauss_newton import Fit
 from ..residuals.in_band import in_band
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
 from ..residuals.residuals import analyse, free_run, noise_floor
@@ -135,75 +138,112 @@ def _with_assumed_noise(path: SelectionPath) -> list[str]:
     return [one.test.id for one in path.records if any(spectrum.assumed for spectrum in one.spectra)]
 
 
+class _Told(NamedTuple):
+    """What a path has found, in the terms of the contract, before a verdict is given on it."""
+
+    given: Model  # from the stated time zero on
+    models: tuple[Model, ...]  # as given, then after each step; where that is moved, first from the stated time zero
+    runs: tuple[float, ...]  # RMS of the free run of each, m/s^2
+    moved: tuple[StepReport, ...]  # the step to where the motion begins, if it is told
+    added: tuple[StepReport, ...]  # one for each effect
+    ranking: tuple[Ranked, ...]  # of the first step
+    band: int | None  # CFC in which errors are told
+    drift: Drift  # left by the last model
+
+    @property
+    def steps(self) -> tuple[StepReport, ...]:
+        return (*self.moved, *self.added)
+
+    @property
+    def final(self) -> Model:
+        return self.models[-1]
+
+
 def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zero: TimeZero | None) -> Diagnosis:
-    models = sized_models(path.steps, path.final)
-    band = band_of_steps(path.steps)
-    given = zero.as_stated if zero else models[0]
-    before = left_by(given, band)
-    if tolerance.stated and tolerance.admits(before):  # whoever says so wants nothing added
-        path, zero = up_to(path, 0), None
-        models = sized_models(path.steps, path.final)
-    steps, final, added = path.steps, models[-1], path.added
-    runs = [free_run(model.fit).rms for model in models]
-    pairs = zip(steps, models, models[1:], zip(runs, runs[1:], strict=False), strict=False)  # the last has no successor
-    of_all = fit_of_all(steps[: len(added)], path.final)
-    reports = effects_added = tuple(step_of(*each, of_all) for each in list(pairs)[: len(added)])
-    drift = _drift_left_by(path, final)
-    sure = next((k for k, one in enumerate(reports) if abs(one.coefficient) <= one.std), len(added))
-    if 0 < sure < len(added) and not (final.white and drift.constant):
+    given = zero.as_stated if zero else path.steps[0].sized
+    if tolerance.stated and tolerance.admits(left_by(given, band_of_steps(path.steps))):
+        path, zero = up_to(path, 0), None  # whoever says so wants nothing added
+    told = _told(given, path, zero)
+    sure = _sure(told)
+    if sure < len(path.added):
         return _answer(structure, up_to(path, sure), tolerance, zero)
-    ranking, after = ranking_of(steps[0]), left_by(final, band)
-    by_first = _explained_by_first_effect(models, added, band)
-    if zero:
-        runs = [free_run(given.fit).rms, *runs]
-        moved = time_zero_step(zero, models[0], (runs[0], runs[1]))
-        models, reports = (given, *models), (moved, *effects_added)
-        ranking = ranking if added else (as_ranked(moved), *ranking)
-    weighed = final.fit.problem.noise_is_inflated or after.share_explained(before) > THRESHOLDS.nearly_all
-    certain = all(abs(one.coefficient) > one.std for one in reports)
-    many = len(added) or len(reports)  # a time zero is none of the effects that may be too many
-    needed = needed_share(added)
-    evidence = Evidence(
-        many,
-        final.white,
-        drift,
-        before,
-        after,
-        ranking,
-        weighed,
-        certain,
-        by_first,
-        needed,
-        structure.place_of,
-        bool(_with_assumed_noise(path)),
-    )
+    evidence = _evidence(path, told, structure)
     verdict = verdict_on(evidence, tolerance)
-    if added and verdict.word == ADEQUATE:
+    if path.added and verdict.word == ADEQUATE:
         return _answer(structure, up_to(path, 0), tolerance, None)
-    if len(added) > 1 and verdict.word == UNEXPLAINED:
+    if len(path.added) > 1 and verdict.word == UNEXPLAINED:
         first = _answer(structure, up_to(path, 1), tolerance, zero)
         if first.verdict == EFFECT_MISSING:  # what came after it is no reason to doubt it
             return first
+    final = told.final
     floor = noise_floor(given.fit.layout, given.records)
     return Diagnosis(
         verdict=verdict.word,
         complete=verdict.complete,
-        left=after,
-        left_before=before,
+        left=evidence.after,
+        left_before=evidence.before,
         noise=evidence.noise,
         tolerance=tolerance,
-        text=verdict_text(verdict, evidence, tolerance, reports, given, final, floor, structure),
+        text=verdict_text(verdict, evidence, tolerance, told.steps, given, final, floor, structure),
         residual_rms=Rms(given.residuals.rms, final.residuals.rms, floor),
-        free_run_rms=Rms(runs[0], runs[-1]),
-        ranking=ranking,
-        steps=reports,
-        remaining=ranking_of(steps[-1]),
-        constants=fitted_constants(of_all),
+        free_run_rms=Rms(told.runs[0], told.runs[-1]),
+        ranking=told.ranking,
+        steps=told.steps,
+        remaining=ranking_of(path.steps[-1]),
+        constants=fitted_constants(_fit_of_all(path)),
         misfit=misfit_windows(given.fit.layout, given.records, given.residuals),
         misfit_after=misfit_windows(final.fit.layout, final.records, final.residuals),
-        structure=_with_effects(path.structure, added, effects_added),
-        models=models,
+        structure=_with_effects(path.structure, path.added, told.added),
+        models=told.models,
     )
+
+
+def _told(given: Model, path: SelectionPath, zero: TimeZero | None) -> _Told:
+    """zero: the time zeros that recordings were moved to, which are told as the first step."""
+    models, band, of_all = sized_models(path.steps, path.final), band_of_steps(path.steps), _fit_of_all(path)
+    runs = tuple(free_run(model.fit).rms for model in models)
+    pairs = zip(path.steps, pairwise(models), pairwise(runs), strict=False)  # the last step has added nothing
+    added = tuple(step_of(step, *of, run, of_all) for step, of, run in list(pairs)[: len(path.added)])
+    ranking, drift = ranking_of(path.steps[0]), _drift_left_by(path, models[-1])
+    if zero is None:
+        return _Told(given, models, runs, (), added, ranking, band, drift)
+    runs = (free_run(given.fit).rms, *runs)
+    moved = time_zero_step(zero, models[0], (runs[0], runs[1]))
+    ranking = ranking if added else (as_ranked(moved), *ranking)
+    return _Told(given, (given, *models), runs, (moved,), added, ranking, band, drift)
+
+
+def _sure(told: _Told) -> int:
+    """How many of the effects that were added are told: those before the first one within its standard deviation, if
+    that is not the first of all, where more than noise is left."""
+    if told.final.white and told.drift.constant:
+        return len(told.added)
+    within = (k for k, one in enumerate(told.added) if abs(one.coefficient) <= one.std)
+    return next(within, 0) or len(told.added)
+
+
+def _evidence(path: SelectionPath, told: _Told, structure: Structure) -> Evidence:
+    before, after = left_by(told.given, told.band), left_by(told.final, told.band)
+    from_there_on = told.models[len(told.moved) :]
+    inflated = told.final.fit.problem.noise_is_inflated
+    return Evidence(
+        added=len(path.added) or len(told.steps),  # a time zero is none of the effects that may be too many
+        white=told.final.white,
+        drift=told.drift,
+        before=before,
+        after=after,
+        ranking=told.ranking,
+        weighed=inflated or after.share_explained(before) > THRESHOLDS.nearly_all,
+        certain=all(abs(one.coefficient) > one.std for one in told.steps),
+        by_first=_explained_by_first_effect(from_there_on, path.added, told.band),
+        needed=needed_share(path.added),
+        place_of=structure.place_of,
+        assumed=bool(_with_assumed_noise(path)),
+    )
+
+
+def _fit_of_all(path: SelectionPath) -> Fit:
+    return fit_of_all(path.steps[: len(path.added)], path.final)
 
 
 def _with_effects(structure: Structure, added: Sequence[Addition], steps: Sequence[StepReport]) -> Structure:
