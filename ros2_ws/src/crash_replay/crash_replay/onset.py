@@ -34,7 +34,7 @@ LEAST_AT_REST = 40
 """Samples: their standard deviation is known to a tenth."""
 RUNS, LEAST_RUN = (0.0005, 0.001, 0.002, 0.004), 5
 """s, and samples, of the means that are watched: the first is shorter than the rise of any stiff structure and longer
-than a spike; the last is as long as AT_REST tells the scatter of, and knows a rise of 1 g/ms in a noise of 2 g."""
+than a spike; the last is as long as AT_REST tells the scatter of, and sees 2.5 g in a noise of 2 g at 10 kHz."""
 ALARM, HOLDS = 8.0, 2
 """Standard deviations, which white noise does not reach in any record, and runs that a spike does not last."""
 SHAKES = 0.00125
