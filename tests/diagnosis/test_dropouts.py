@@ -29,6 +29,12 @@ def test_a_dead_channel_is_found_and_nothing_else(padded):
     assert not any(dropouts(column).any() for column in padded.values.T)
 
 
+def test_a_channel_that_dies_for_good_is_found(padded):
+    peak = int(np.argmax(np.abs(padded.column("rib_ay"))))
+    lost = dropouts(dead(padded, "rib_ay", slice(peak, None), 0.0).column("rib_ay"))
+    assert np.flatnonzero(lost).tolist() == list(range(peak, len(padded)))
+
+
 def test_a_right_model_of_a_recording_with_a_dead_channel_is_adequate(padded):
     found = diagnose(load_model("side_dummy"), [dead(padded, "rib_ay", slice(700, 740), 0.0)])
     assert found.verdict == "adequate", found.text

@@ -6,5 +6,6 @@ reached on the way, F = c (X - gap) where that is positive; `late_back`: where b
 
 from .base import PairSpring, Shape
 
-EFFECT = PairSpring("load_path", "N/m", {"gap": Shape("m", 1e-3, 0.5, (0.01, 0.03, 0.1))})
-"""Limits of the gap: below, it carries from the beginning; above, nothing of a car is left to be reached."""
+EFFECT = PairSpring("load_path", "N/m", {"gap": Shape("m", 1e-3, 0.5, (0.1,))})
+"""Limits of the gap: below, it carries from the beginning; above, nothing of a car is left to be reached. Where
+it is not stated, it starts as given here; it is searched for from shares of how close the bodies come."""
