@@ -129,8 +129,16 @@ def diagnose(
         taken = {shift.test: shift.seconds for shift in begun.taken}
         remarks.append(f"{signals_begin(taken)}, and are compared from there on")
     if stopped:
-        remarks.append(f"stopped after {limit_text(seconds)}: not everything was tried")
+        remarks.append(f"stopped after {limit_text(seconds)}: not everything was tried{_so_far(found)}")
     return replace(found, stopped=stopped, text="; ".join([found.text, *remarks]))
+
+
+def _so_far(found: Diagnosis) -> str:
+    """What leads where nothing was added in time."""
+    leads = [one for one in found.ranking[:1] if one.evidence > THRESHOLDS.gain]
+    if found.verdict != UNEXPLAINED or found.steps or not leads:
+        return ""
+    return f", and {leads[0].name} leads so far"
 
 
 def _with_assumed_noise(path: SelectionPath) -> list[str]:
