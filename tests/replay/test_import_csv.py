@@ -137,8 +137,33 @@ def test_time_in_ms_is_refused(tmp_path):
     rows = [f"{k * 0.1 - 30.0:.1f},1,2,3,4" for k in range(1301)]
     path = write(tmp_path, "time,rib_ay,barrier_fx,nose_travel,spare\n" + "\n".join(rows))
     assert error(path) == (
-        "t.csv: time runs from -30 to 100 s with a sample every 0.1 s, which is no crash: it must be in s; is it in ms?"
+        "t.csv: time runs from -30 to 100 s with a sample every 0.1 s, which is no crash; is it in ms? "
+        "Then name the column `time [ms]`"
     )
+    named = write(tmp_path, "time [ms],rib_ay,barrier_fx,nose_travel,spare\n" + "\n".join(rows))
+    assert_allclose(read_source(named).time[[0, -1]], [-0.030, 0.1], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        lambda table: table.replace(",", ";"),
+        lambda table: table.replace(",", ";").replace(".", ","),
+        lambda table: table.replace(",", "\t").replace(".", ","),
+        lambda table: "# exported by a logger; channel list, 4 of 4\n\n#\n" + table,
+        lambda table: table.replace("time", "Time (s)"),
+    ],
+)
+def test_a_table_may_be_written_as_loggers_and_spreadsheets_do(tmp_path, form):
+    expected = read_source(write(tmp_path))
+    found = read_source(write(tmp_path, form(CSV)))
+    assert_array_equal(found.values, expected.values)
+    assert_array_equal(found.time_ns, expected.time_ns)
+
+
+def test_a_mistake_below_lines_above_the_header_has_its_own_line(tmp_path):
+    path = write(tmp_path, "# a logger's\n" + CSV.replace("1.0,10,", "1.0,1O,"))
+    assert error(path).startswith("t.csv:4: column 'barrier_fx': expected a number")
 
 
 def test_id_is_the_file_name_where_none_is_given_and_numbers_are_names(tmp_path):
@@ -178,6 +203,7 @@ def test_names_file_beside_or_given(tmp_path):
 
 
 # (what is replaced in the CSV or YAML, by what, the message)
+HEADER = "expected a header of names, separated by commas, semicolons or tabs, the first `time` (in s, or `time [ms]`)"
 MISTAKES = [
     ("unit: g", "unit: gs", "t.yaml: channels.rib_ay: unknown unit 'gs' for acceleration; expected one of m/s^2, "),
     ("unit: kN", "unit: mm", "t.yaml: channels.barrier_fx: unknown unit 'mm' for force; mm is a unit of displacement"),
@@ -192,7 +218,8 @@ MISTAKES = [
     ("sign: -1", "sign: 2", "t.yaml:3: channels.rib_ay.sign: should be 1 or -1, found 2"),
     ("axis: y", "axis: w", "t.yaml:3: channels.rib_ay.axis: should be 'x', 'y', 'z' or '', found 'w'"),
     ("rib: 0.5", "rib: .nan", "t.yaml:6: initial_velocity.rib: must be a number from -10000 to 10000 m/s, got nan"),
-    ("time,", "t,", "t.csv:1: expected a header of comma-separated names, the first `time` (in s), found 't,rib_ay"),
+    ("time,", "t,", f"t.csv:1: {HEADER}, found 't,rib_ay,barrier_fx,nose_travel,spare'"),
+    ("time,", "Logger 7\ntime,", f"t.csv:1: {HEADER}, found 'Logger 7'; lines above it begin with #"),
     (",barrier_fx,", ",rib_ay,", "t.csv:1: column 'rib_ay' appears more than once"),
     ("0.0,1.0,10,", "0.0,1.0,1O,", "t.csv:3: column 'barrier_fx': expected a number or an empty cell, found '1O'"),
     ("-2.0,,", "-2.0,", "t.csv:4: expected 5 cells as in the header, found 4"),
@@ -202,9 +229,9 @@ MISTAKES = [
     (CSV.split("\n", 1)[1], "", "t.csv: has no samples, only a header"),
     (CSV, "", "t.csv:1: expected a header"),
     (
-        CSV,
-        CSV.replace(",", ";"),
-        "t.csv:1: expected a header of comma-separated names, the first `time` (in s), found 'time;rib_ay",
+        "1.0,10,",
+        "1,0,10,",
+        "t.csv:3: expected 5 cells as in the header, found 6; decimal commas need columns separated",
     ),
 ]
 

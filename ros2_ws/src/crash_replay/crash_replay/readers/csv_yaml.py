@@ -1,18 +1,21 @@
 """CSV with a YAML of the same name beside it.
 
-    rib.csv:   time,rib_ay,...         s, then one column for each channel
+    rib.csv:   time,rib_ay,...         s, or `time [ms]`, then one column for each channel
     rib.yaml:  test: {id: T1, title: "...", source: "...", date: 2019-05-04}
                channels: {rib_ay: {quantity: acceleration, unit: g, body: rib, axis: y, sign: 1}}
                initial_velocity: {rib: 0.0}          m/s at time zero and before it
                initial_displacement: {rib: -0.02}    m at time zero
 
-A channel's `name` replaces the column's, where that does not fit (letters, digits and underscores).
+Lines above the header begin with #. Columns may be separated by semicolons or tabs as well; then numbers may have
+decimal commas. A channel's `name` replaces the column's, where that does not fit (letters, digits and underscores).
 """
 
 import csv
+import re
 from array import array
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import dropwhile
 from pathlib import Path
 from typing import Literal
 
@@ -28,6 +31,12 @@ from .units import si_factor
 
 LONG, SPARSE = 10.0, 0.01
 """s: no crash is that long and sampled that seldom. 10 ms of one, written in ms, look like it."""
+
+
+SEPARATORS = ",;\t"
+TIME = re.compile(r"time[\s_]*[\[(]?\s*(s|ms|us)?\s*[\])]?", re.IGNORECASE)
+"""The first column's name."""
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 
 
 class CsvChannel(ChannelNames):
@@ -96,40 +105,60 @@ def _read_table(path: Path) -> tuple[list[str], np.ndarray]:
         if wrong := limits.file_wrong(path, limits.TABLE_FILE):
             raise RecordingError(f"{path}: {wrong}")
         with path.open(newline="", encoding="utf-8-sig") as file:
-            lines = csv.reader(file)
-            columns = [name.strip() for name in next(lines, [])]
-            _check_header(path, columns)
-            for row in lines:
-                if row:
-                    cells.extend(_numbers(path, lines.line_num, columns, row))
+            rows = _rows(file)
+            line, columns = next(rows, (1, []))
+            unit = _checked_header(path, line, columns)
+            for line, row in rows:
+                cells.extend(_numbers(path, line, columns, row))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise RecordingError(f"{path}: cannot be read as a CSV text file ({error})") from None
     if not cells:
         raise RecordingError(f"{path}: has no samples, only a header")
     table = np.array(cells).reshape(-1, len(columns))
     table[~np.isfinite(table)] = np.nan
+    table[:, 0] *= unit
     _check_time(path, table[:, 0])
     return columns, table
 
 
-def _check_header(path: Path, columns: Sequence[str]) -> None:
-    if len(columns) < 2 or columns[0] != "time":
-        shown = limits.shown(",".join(columns))
+def _rows(file: Iterator[str]) -> Iterator[tuple[int, list[str]]]:
+    """Line and cells of the header, and of each sample."""
+    first, header = next(dropwhile(_is_above, enumerate(file, start=1)), (1, ""))
+    separator = max(SEPARATORS, key=header.count)
+    yield first, [name.strip() for name in next(csv.reader([header], delimiter=separator), [])]
+    lines = csv.reader(file, delimiter=separator)
+    for row in lines:
+        if row:
+            yield first + lines.line_num, row if separator == "," else [cell.replace(",", ".") for cell in row]
+
+
+def _is_above(numbered: tuple[int, str]) -> bool:
+    """Whether a line is not the header yet."""
+    return not numbered[1].strip() or numbered[1].startswith("#")
+
+
+def _checked_header(path: Path, line: int, columns: Sequence[str]) -> float:
+    """s in the unit of time."""
+    time = TIME.fullmatch(columns[0]) if columns else None
+    if len(columns) < 2 or not time:
         raise RecordingError(
-            f"{path}:1: expected a header of comma-separated names, the first `time` (in s), found {shown}"
+            f"{path}:{line}: expected a header of names, separated by commas, semicolons or tabs, the first `time` "
+            f"(in s, or `time [ms]`), found {limits.shown(','.join(columns))}; lines above it begin with #"
         )
     if wrong := limits.count_wrong("has", len(columns) - 1, limits.CHANNELS):
-        raise RecordingError(f"{path}:1: {wrong}")
+        raise RecordingError(f"{path}:{line}: {wrong}")
     doubled = [name for name, count in Counter(columns).items() if count > 1]
     if doubled:
         raise RecordingError(
-            f"{path}:1: column {limits.shown(doubled[0])} appears more than once: rename or remove one"
+            f"{path}:{line}: column {limits.shown(doubled[0])} appears more than once: rename or remove one"
         )
+    return SECONDS[(time[1] or "s").lower()]
 
 
 def _numbers(path: Path, line: int, columns: Sequence[str], cells: Sequence[str]) -> list[float]:
     if len(cells) != len(columns):
-        raise RecordingError(f"{path}:{line}: expected {len(columns)} cells as in the header, found {len(cells)}")
+        more = "; decimal commas need columns separated by semicolons or tabs" if len(cells) > len(columns) else ""
+        raise RecordingError(f"{path}:{line}: expected {len(columns)} cells as in the header, found {len(cells)}{more}")
     try:
         return [float(cell) if cell.strip() else np.nan for cell in cells]
     except ValueError:
@@ -154,7 +183,9 @@ def _check_time(path: Path, time: np.ndarray) -> None:
     if len(row):
         raise RecordingError(f"{path}: sample {row[0]}: time is missing")
     if wrong := limits.times_wrong(time):
-        raise RecordingError(f"{path}: {wrong}: it must be in s since the impact; is it in ms, or a date?")
+        raise RecordingError(
+            f"{path}: {wrong}: it must be in s since the impact; is it a date? Of one in ms name the column `time [ms]`"
+        )
     backwards = np.flatnonzero(np.diff(np.rint(time * 1e9)) <= 0)
     if len(backwards):
         k = int(backwards[0]) + 1
@@ -166,5 +197,5 @@ def _check_time(path: Path, time: np.ndarray) -> None:
         raise RecordingError(
             f"{path}: time runs from {time[0]:.6g} to {time[-1]:.6g} s "
             f"with a sample every {np.median(np.diff(time)):.4g} s, "
-            "which is no crash: it must be in s; is it in ms?"
+            "which is no crash; is it in ms? Then name the column `time [ms]`"
         )
