@@ -11,7 +11,7 @@ from test_import_nhtsa import SENSORS, curve, write_folder
 from crash_replay import limits
 from crash_replay.readers import body_means, is_bag, isomme, nhtsa, read_source
 from crash_replay.readers.codes.nhtsa import LOCATIONS
-from crash_replay.readers.csv_yaml import LONG, _check_header, _check_time
+from crash_replay.readers.csv_yaml import LONG, _check_time, _checked_header
 from crash_replay.readers.description import apply_names
 from crash_replay.readers.ev5 import _angle, _test_number, read_header
 from crash_replay.readers.isomme import MmeFile
@@ -143,9 +143,9 @@ def test_a_csv_file_may_have_as_many_channels_as_are_allowed(more):
     names = [f"c{k}" for k in range(int(limits.CHANNELS.highest) + more)]
     if more:
         with pytest.raises(RecordingError, match=f"has {len(names)} "):
-            _check_header(Path("a.csv"), ["time", *names])
+            _checked_header(Path("a.csv"), 1, ["time", *names])
     else:
-        _check_header(Path("a.csv"), ["time", *names])
+        _checked_header(Path("a.csv"), 1, ["time", *names])
 
 
 def test_the_header_of_ev5_says_who_made_the_test_and_how(tmp_path):
