@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 
 from crash_estimator.core.characteristic import Characteristic, characteristics
 from crash_estimator.core.compare_free_run import compare
+from crash_estimator.core.errors import EquationError
 from crash_estimator.core.fold import run
 from crash_estimator.core.free_run import free_run
 from crash_estimator.core.methods import make_estimator
@@ -21,6 +22,7 @@ from crash_estimator.core.validation import (
     validate,
 )
 from crash_estimator.model_file import load_model
+from crash_estimator.tables import larger_than_measured
 from crash_estimator.validation_tables import comparison_table, correlation_table, covariance_table
 from crash_replay.synthetic.recordings import SCENARIOS
 
@@ -184,3 +186,10 @@ def test_the_correlation_of_equations_is_their_covariance_in_units_of_their_scat
     found = validate(structure, description, estimates)
     assert_allclose(found.covariance, [[np.var(values, ddof=1)]])
     assert_allclose(found.correlation, [[1.0]])
+
+
+@pytest.mark.parametrize("variance, said", [(0.9, ""), (1.1, "car: the error is larger than what was measured")])
+def test_an_error_larger_than_what_was_measured_is_said(variance, said):
+    row = EquationError("car", "N", 100, 5.0, 1.0, 5.0, 1.0, 0.0, variance, variance**0.5)
+    found = larger_than_measured([row._replace(equation="engine", error_variance=0.1), row])
+    assert found.startswith(said) and bool(found) == bool(said) and "engine" not in found

@@ -57,6 +57,17 @@ def parameter_table(description: Description, estimates: Sequence[Estimate]) -> 
     return table(head, rows)
 
 
+def larger_than_measured(errors: Sequence[EquationError]) -> str:
+    """Of equations whose error scatters more than what was measured; "" where there are none."""
+    lost = [row.equation for row in errors if row.error_variance > row.input_variance]
+    if not lost:
+        return ""
+    return (
+        f"{', '.join(lost)}: the error is larger than what was measured, so these parameters say nothing of it; "
+        "another --method may, and `diagnose` says what the model lacks"
+    )
+
+
 def millimetres(length: float) -> str:
     """Of a crush in m: a car's to the millimetre, a small rig's to its third digit."""
     return f"{length * 1e3:.0f}" if abs(length) >= 0.1 else f"{length * 1e3:.3g}"

@@ -15,7 +15,14 @@ from ...core.fold import run
 from ...core.methods import AnyEstimator, make_estimator
 from ...core.passes import most_passes, repeats, settle
 from ...model_file import load_model
-from ...tables import besides_table, error_table, known_effects_table, never_touches, parameter_table
+from ...tables import (
+    besides_table,
+    error_table,
+    known_effects_table,
+    larger_than_measured,
+    never_touches,
+    parameter_table,
+)
 from ..common import check_written, effects_of, parse_settings, read_crash, write_json
 
 
@@ -42,6 +49,8 @@ def estimate(arguments: argparse.Namespace) -> None:
     if known := known_effects_table(structure.effects, effects, description):
         say(f"{known}\n")
     say(error_table(errors))
+    if lost := larger_than_measured(errors):
+        say(f"\n{lost}")
     for k, name in enumerate(description.elements):
         if all(estimate.state[k] == ElementState.APART for estimate in estimates):
             say(f"\n{never_touches(name)}")
