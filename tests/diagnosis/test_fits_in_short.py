@@ -22,7 +22,7 @@ from crash_estimator.core.diagnosis.output_error.problem import make_problem
 from crash_estimator.core.diagnosis.output_error.simulation import simulate
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
 from crash_estimator.core.diagnosis.residuals.residuals import _absorbed, analyse
-from crash_estimator.core.diagnosis.residuals.score_test import MODES, _with_motion
+from crash_estimator.core.diagnosis.residuals.score_test import MODES, _accelerated, _with_motion
 from crash_estimator.core.diagnosis.selection.score_screening import screen
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.effects.effect import Addition
@@ -179,27 +179,37 @@ class Columns(NamedTuple):
     column: np.ndarray
     body: np.ndarray
     acts: np.ndarray
+    ends: np.ndarray
+    inverse_mass: np.ndarray
 
 
 class Rows(NamedTuple):
     linear: Columns
     rows: np.ndarray
     columns: np.ndarray
+    links: list[SimpleNamespace]
 
 
-def test_directions_of_masses_and_forces_stand_after_the_parameters_and_before_the_knots():
-    """Two parameters and two knots; each mode once for the free body's mass, once for the force on it."""
-    linear = Columns(np.ones((2, 2, 3)), 3, np.array([0, 1]), np.array([0, 1]), np.zeros((2, 4)))
-    equations = Rows(linear, np.array([[1.0, 9.0], [-3.0, 9.0], [2.0, 9.0], [0.0, 9.0]]), np.array([0, 1, 30, 31]))
-    modes = np.cos(np.pi * np.arange(1, MODES + 1) * (np.arange(4) / 4.0)[:, None])
-    found = _with_motion(equations, modes, [0], first=40)
-    assert found.columns.tolist() == [0, 1, *range(40, 40 + 2 * MODES), 30, 31]
-    assert found.linear.others == 3 + 2 * MODES
-    assert found.linear.start.tolist() == [[[1.0] * 3 + [0.0] * 2 * MODES] * 2] * 2  # they change no body's start
-    assert found.linear.column.tolist() == [0, 1, *range(3, 3 + 2 * MODES)]
-    assert found.linear.body.tolist() == [0, 1] + [0] * 2 * MODES
-    assert_allclose(found.linear.acts[2], -equations.rows[:, 0] * modes[:, 0])
-    assert_allclose(found.linear.acts[2 + MODES], 3.0 * modes[:, 0])
+def test_directions_of_masses_forces_and_elements_stand_after_the_parameters_and_before_the_knots():
+    """Two parameters and two knots; each mode once for the free body's mass, once for the force on it, and once for the
+    element before it, which pushes both its ends."""
+    force, row = np.array([0.0, 6.0, 4.0, 2.0]), np.array([1.0, -3.0, 2.0, 0.0])
+    linear = Columns(
+        np.ones((2, 2, 3)), 3, np.array([0, 1]), np.array([0, 1]), np.zeros((2, 4)), np.array([[0, 1]]),
+        np.array([0.5, 1.0]),
+    )  # fmt: skip
+    links = [SimpleNamespace(force=force)]
+    equations = Rows(linear, np.stack([row, np.full(4, 9.0)], axis=1), np.array([0, 1, 30, 31]), links)
+    modes = np.cos(np.pi * np.arange(1, MODES + 1)[:, None] * (np.arange(4) / 4.0))
+    found = _with_motion(equations, _accelerated(equations, [0]), modes, first=40)
+    assert found.columns.tolist() == [0, 1, *range(40, 40 + 3 * MODES), 30, 31]
+    assert found.linear.others == 3 + 3 * MODES
+    assert found.linear.start.tolist() == [[[1.0] * 3 + [0.0] * 3 * MODES] * 2] * 2  # they change no body's start
+    element = range(3 + 2 * MODES, 3 + 3 * MODES)
+    assert found.linear.column.tolist() == [0, 1, *range(3, 3 + 3 * MODES), *element]
+    assert found.linear.body.tolist() == [0, 1] + [0] * 3 * MODES + [1] * MODES
+    acts = found.linear.acts[2:].reshape(4, MODES, 4)
+    assert_allclose(acts, [-row * modes, 3.0 * modes, -0.5 * force * modes, force * modes])
 
 
 def test_half_way_back_is_half_of_each_acceleration(recording):

@@ -64,17 +64,20 @@ def test_a_contact_that_is_apart_neither_is_crushed_nor_moves(monkeypatch, tensi
 @pytest.mark.parametrize(
     ("squares", "named"),
     [
-        ((40.0, 1.0, 2.0), "the mass of car"),
-        ((1.0, 40.0, 2.0), "a force on car"),
-        ((40.0, 39.9, 2.0), "the mass of car or a force on car"),  # which of them, nobody can tell
+        ((40.0, 1.0, 1.0, 2.0), "the mass of car"),
+        ((1.0, 40.0, 1.0, 2.0), "a force on car"),
+        ((1.0, 1.0, 40.0, 2.0), "the stiffness of front"),
+        ((1.0, 1.0, 2.0, 40.0), "the gain of car_ax"),
+        ((40.0, 39.9, 1.0, 2.0), "the mass of car or a force on car"),  # which of them, nobody can tell
     ],
 )
 def test_what_varies_with_time_is_named_with_what_cannot_be_told_from_it(monkeypatch, squares, named):
-    layout = SimpleNamespace(kind=[score_test.FREE], bodies=["car"], outputs=[SimpleNamespace(channel="car_ax")])
+    links, outputs = [SimpleNamespace(name="front")], [SimpleNamespace(channel="car_ax")]
+    layout = SimpleNamespace(kind=[score_test.FREE], bodies=["car"], links=links, outputs=outputs)
     modes, statistics = score_test.MODES, iter(squares)
     normal = SimpleNamespace(cost=1040.0, samples=1000)
     monkeypatch.setattr(score_test, "_normal_equations", lambda *given: normal)
-    monkeypatch.setattr(score_test, "_marginal", lambda *given: (np.zeros(3 * modes), np.eye(3 * modes)))
+    monkeypatch.setattr(score_test, "_marginal", lambda *given: (np.zeros(4 * modes), np.eye(4 * modes)))
     monkeypatch.setattr(score_test, "_statistic", lambda *given: (next(statistics), 4))
     found = score_test.drift_of(SimpleNamespace(layout=layout))
     assert found.what == named and not found.constant

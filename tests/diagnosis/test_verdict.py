@@ -108,7 +108,7 @@ def test_evidence_is_weighed_in_noise_as_large_as_what_is_left_or_where_next_to_
     fit = SimpleNamespace(problem=SimpleNamespace(noise_is_inflated=inflated))
     final = SimpleNamespace(fit=fit, white=False, additions=("friction",))
     path = SimpleNamespace(
-        steps=[SimpleNamespace(before=given)], final=final, present=0, added=final.additions, records=()
+        steps=[SimpleNamespace(before=given, sized=given)], final=final, added=final.additions, records=()
     )
     made_up = {
         "band_of_steps": None, "sized_models": (given, final), "free_run": SimpleNamespace(rms=1.0), "fit_of_all": None,
