@@ -3,6 +3,8 @@
 Cab and engine hit the barrier; the truth is simulated here by scipy's integrator.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -10,6 +12,10 @@ from scipy.integrate import solve_ivp
 
 from crash_estimator.core.derived_motion import with_accelerations
 from crash_estimator.core.diagnosis import diagnose
+from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
+from crash_estimator.core.diagnosis.selection.candidates import candidates
+from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.fold import run
 from crash_estimator.core.free_run import free_run
 from crash_estimator.core.kinematics import Kinematics
@@ -147,6 +153,19 @@ def test_what_momentum_lacks_is_said(model, changed, lacks):
         text = text.replace("[cab, engine]", "[cab, barrier]")
     with pytest.raises(ModelError, match="names no channel for its motion, and momentum does not say it: .*" + lacks):
         model(text)
+
+
+@pytest.mark.parametrize(("of", "offered"), [("engine", False), ("gearbox", True)])
+def test_a_channel_of_its_own_that_the_model_does_not_use_makes_no_second_body_of_it(model, of, offered):
+    one = crashed(0.0, 1)
+    channel = Channel("further_ax", "acceleration", of, axis="x")
+    channels = (*(replace(each, axis="x") for each in one.test.channels), channel)
+    values = np.column_stack([one.values, one.values[:, 0]])
+    recording = Recording(replace(one.test, channels=channels), one.time_ns, values)
+    structure, recordings = with_accelerations(model(CAR), [recording])
+    magnitudes = measure_magnitudes(structure, [observe(structure, each) for each in recordings])
+    found = {one.key for one in candidates(magnitudes, EFFECTS)}
+    assert (("unmodelled_body", "further_ax") in found) == offered
 
 
 def test_sample_by_sample_it_is_refused(model):
