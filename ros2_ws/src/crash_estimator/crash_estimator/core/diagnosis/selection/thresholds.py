@@ -64,7 +64,7 @@ class Thresholds(NamedTuple):
       0.02 and nothing;
     - what is left, that the first of two at once removes: of three looked-at pairs that are only found so it was 0.19
       to 0.38;
-    - what is left, that goes along with something varying in time: told from here on."""
+    - what is left, that goes along with something varying in time: told from here on; not varied."""
     half: float = 0.5
     """A share of
 
