@@ -72,7 +72,7 @@ def test_other_contacts_must_explain_a_share_of_what_is_above_the_noise(monkeypa
     best = SimpleNamespace(fit=SimpleNamespace(evidence=best_first))
     path = SimpleNamespace(
         structure="as stated", added=(one,), final=final, cells=36, as_recorded=final.fit, whole=True,
-        steps=[SimpleNamespace(before=final, as_recorded=[best])], furthest=final.fit, records=[record],
+        steps=[SimpleNamespace(before=final, as_recorded=[best])], least_cost=final.fit.cost, records=[record],
     )  # fmt: skip
     with_fits(monkeypatch, gain * THRESHOLDS.gain)
     monkeypatch.setattr(contact_promise, "moves_otherwise", lambda *given: True)
@@ -90,7 +90,7 @@ def test_candidates_that_contacts_concern_are_asked_behind_those_that_they_do_no
     record = SimpleNamespace(bins=500, measured=np.zeros((1, 2)))
     path = SimpleNamespace(
         structure="as stated", added=(), final=given, cells=36, as_recorded=given.fit, whole=False,
-        steps=[SimpleNamespace(before=given, as_recorded=first)], furthest=fits["speed"], records=[record],
+        steps=[SimpleNamespace(before=given, as_recorded=first)], least_cost=3000.0, records=[record],
     )  # fmt: skip
     likely = [([SimpleNamespace(key=(key, "car"), variant="")], fitted) for key, fitted in fits.items()]
     with_fits(monkeypatch, -1000.0 + 1000.0 * gains)
@@ -112,7 +112,7 @@ def test_rare_candidates_that_leave_less_than_all_others_are_asked_first(monkeyp
         cells=36,
         steps=[first],
         final=model(white=False),
-        furthest=SimpleNamespace(cost=0.0),
+        least_cost=0.0,
     )
     monkeypatch.setattr(contact_promise, "measure_magnitudes", lambda *given: None)
     monkeypatch.setattr(contact_promise, "_in_other_forms", lambda addition: ())

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from crash_estimator.core.diagnosis.mechanics.driven_motion import driven_by, driven_motion
-from crash_estimator.core.diagnosis.mechanics.masses import attached_inertia
+from crash_estimator.core.diagnosis.mechanics.masses import measured_inertia
 from crash_estimator.core.diagnosis.observation.grid import DRIVEN_MODES, on_grid
 from crash_estimator.core.diagnosis.observation.tracked_motion import tracked_acceleration
 from crash_estimator.core.diagnosis.observation.trajectory import element_motion
@@ -69,9 +69,11 @@ def test_its_derivatives_are_their_finite_differences():
 def test_an_attached_body_pushes_without_its_ringing_where_noise_stands_for_that(inflated, step, filtered):
     """And sampling is fast enough for the filter."""
     a = np.column_stack([np.zeros_like(LEFT), LEFT + 50.0 * np.sin(2.0 * np.pi * 900.0 * TIME)])
-    record = SimpleNamespace(dt=np.full(len(TIME), step), noise_is_inflated=inflated)
-    inertia = attached_inertia(SimpleNamespace(attached={"box": 1}), record, SimpleNamespace(a=a))
-    assert_allclose(inertia("box"), cfc_filter(a[:, 1], step, 60) if filtered else a[:, 1])
+    signals = {"car": SimpleNamespace(on_grid=a[:, 1])}
+    record = SimpleNamespace(dt=np.full(len(TIME), step), noise_is_inflated=inflated, signals=signals)
+    inertia = measured_inertia(SimpleNamespace(attached={"box": 1}), record, SimpleNamespace(a=a))
+    for channel in ("box", "car"):  # as that of a body of the model, whose mass varies
+        assert_allclose(inertia(channel), cfc_filter(a[:, 1], step, 60) if filtered else a[:, 1])
 
 
 def test_an_element_is_crushed_by_what_its_first_end_goes_towards_its_second():

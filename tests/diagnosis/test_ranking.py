@@ -92,7 +92,8 @@ def test_the_derivatives_of_a_factor_on_a_spring_are_those_of_its_law(name):
     addition = Addition(effect, "spring", dict(shapes))
     term = Term(addition, 0, {key: k for k, key in enumerate(shapes, 1)})
     theta, rate = np.array([0.1, *np.log(list(shapes.values()))]), np.array([-3.0, -0.5, 0.7, 4.0])
-    value, slope, by_shape = link_force._factor(term, theta, rate)
+    none = np.zeros(len(rate))
+    value, slope, by_shape = link_force._factor(term, theta, ElementMotion(none, none, rate, none, none))
     assert_allclose(value, effect.factor(rate, **shapes))
     wide = 1e-3
     expected = (effect.factor(rate + wide, **shapes) - effect.factor(rate - wide, **shapes)) / (2.0 * wide)

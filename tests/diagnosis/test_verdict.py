@@ -28,6 +28,7 @@ from crash_replay.synthetic.hidden.cases import draw_case
 
 FRONTAL = ROOT / "bags" / "frontal_single.mcap"
 STANDS_STILL = Drift(False, 1e-9, "the mass of car", 0.1)
+NOTHING_VARIES = STANDS_STILL._replace(constant=True)
 VARIES = STANDS_STILL._replace(share=0.8)
 
 
@@ -57,12 +58,14 @@ LITTLE, DROWNED = left(0.009, 1.0), left(0.009, 0.13)
     [
         ({}, DEFAULT, "effect_missing", False),
         ({"after": left(0.009, 2.0)}, DEFAULT, "effect_missing", True),
-        ({"white": True, "drift": STANDS_STILL._replace(constant=True)}, DEFAULT, "effect_missing", True),
+        ({"white": True, "drift": NOTHING_VARIES}, DEFAULT, "effect_missing", True),
         ({"after": left(0.19, 9.0)}, DEFAULT, "unexplained", False),  # it explains a fifth
         ({"needed": 0.97}, DEFAULT, "unexplained", False),  # it explains 0.96, by a law that bends far
         ({"drift": VARIES, "by_first": 0.9}, DEFAULT, "unexplained", False),
         ({"drift": VARIES, "by_first": 0.96}, DEFAULT, "effect_missing", False),
         ({"white": True}, DEFAULT, "unexplained", False),  # it looks like noise, and varies with time
+        ({"varying": "a force on car"}, DEFAULT, "unexplained", False),
+        ({"varying": "a force on car", "white": True, "drift": NOTHING_VARIES}, DEFAULT, "unexplained", True),
         ({"weighed": False}, DEFAULT, "unexplained", False),
         ({"certain": False}, DEFAULT, "unexplained", False),
         ({"added": 3}, DEFAULT, "unexplained", False),
@@ -108,7 +111,11 @@ def test_evidence_is_weighed_in_noise_as_large_as_what_is_left_or_where_next_to_
     fit = SimpleNamespace(problem=SimpleNamespace(noise_is_inflated=inflated))
     final = SimpleNamespace(fit=fit, white=False, additions=("friction",))
     path = SimpleNamespace(
-        steps=[SimpleNamespace(before=given, sized=given)], final=final, added=final.additions, records=()
+        steps=[SimpleNamespace(before=given, sized=given)],
+        final=final,
+        added=final.additions,
+        records=(),
+        rival_in_time=None,
     )
     made_up = {
         "band_of_steps": None, "sized_models": (given, final), "free_run": SimpleNamespace(rms=1.0), "fit_of_all": None,

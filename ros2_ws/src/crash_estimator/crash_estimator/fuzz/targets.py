@@ -175,7 +175,7 @@ def _take_effect(folder: Path) -> None:
         if effect.function:
             shapes = {name: shape.starts[-1] for name, shape in effect.shapes.items()}
             with np.errstate(all="ignore"):
-                effect.trial(motion, **shapes)
+                effect.along(motion, **shapes)
 
 
 REQUEST = AddEffect.Request(effect="coulomb_friction", target="rib_spine", options=["coefficient=1810", "speed=0.1"])

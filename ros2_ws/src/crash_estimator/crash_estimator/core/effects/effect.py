@@ -130,8 +130,8 @@ class Effect:
         """The shape constants that it has in one of its variants."""
         return {name: self.shapes[name] for name in self.forms[variant]} if self.forms else self.shapes
 
-    def trial(self, motion: ElementMotion, **shapes: float) -> np.ndarray:
-        """What its function gives on a motion that a user's effect is tried on."""
+    def along(self, motion: ElementMotion, **shapes: float) -> np.ndarray:
+        """(g,) What its function gives along a motion."""
         return getattr(self, self.function)(motion, **shapes)
 
     def common(self) -> "Effect | None":

@@ -119,7 +119,7 @@ def _try_out(where: str, effect: Effect) -> None:
         n: s.starts[0] * (LARGEST_CRUSH if s.of_crush else 1.0) for n, s in effect.shapes_of(effect.variants[0]).items()
     }
     with np.errstate(all="ignore"):
-        values = effect.trial(motion, **shapes)
+        values = effect.along(motion, **shapes)
     bad = np.flatnonzero(~(np.abs(values) <= NUMBER.highest))
     if len(bad):
         at = f"crush {crush[bad[0]]:.3g} m, rate {rate[bad[0]]:.3g} m/s"

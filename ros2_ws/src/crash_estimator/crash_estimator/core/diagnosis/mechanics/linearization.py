@@ -13,7 +13,7 @@ from ..parameterization.terms import Link
 from .driven_motion import driven_by, start_by
 from .linear_system import Linear, Sampling, ranked
 from .link_force import LinkForce, link_force
-from .masses import attached_inertia, body_loads, mass_shares, masses
+from .masses import body_loads, mass_shares, masses, measured_inertia
 from .outputs import sampling
 
 
@@ -81,7 +81,7 @@ def linearise(
     inverse[driven] = 0.0
     actions = _Actions(inverse)
     loads, forces = _link_forces(experiment, theta, trajectory, others, contact_ramp, actions)
-    for term, k, force, by_shapes in body_loads(layout, theta, record, attached_inertia(layout, record, trajectory)):
+    for term, k, force, by_shapes in body_loads(layout, theta, record, measured_inertia(layout, record, trajectory)):
         c = float(theta[term.coefficient])
         loads[:, k] += c * force
         actions.act(term.coefficient, k, inverse[k] * force)

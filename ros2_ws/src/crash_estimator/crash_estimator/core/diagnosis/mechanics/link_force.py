@@ -95,10 +95,11 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
     kp, weight = found.kp * carries, found.weight * carries[:, None]
     factor = np.ones_like(x)
     kv, force = np.zeros_like(x), static
+    motion = ElementMotion(time, x, rate, peak, static)
     if link.factors:
         for term in link.factors:
             c = theta[term.coefficient]
-            h, dh, by_shape = _factor(term, theta, rate)
+            h, dh, by_shape = _factor(term, theta, motion)
             factor = factor + c * h
             kv = kv + static * c * dh
             parameters += [term.coefficient, *term.shapes.values()]
@@ -126,7 +127,6 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
         if link.damping is not None:
             parameters.append(link.damping)
             columns.append(beside.gate * rate)
-        motion = ElementMotion(time, x, rate, peak, static)
         for term in link.parallel:
             c = theta[term.coefficient]
             f = _physics(term).force(motion, **term.shapes_at(theta))
@@ -233,10 +233,10 @@ def _slopes(term: Term, theta: np.ndarray, motion: ElementMotion, force: np.ndar
     return fx, fv, term.by_shapes(theta, force, lambda **shapes: effect.force(motion, **shapes))
 
 
-def _factor(term: Term, theta: np.ndarray, rate: np.ndarray):
+def _factor(term: Term, theta: np.ndarray, motion: ElementMotion):
     """h, dh/dV, and its derivatives by the logarithm of each shape constant."""
     effect, shapes = _physics(term), term.shapes_at(theta)
-    up, down = (effect.factor(rate + step, **shapes) for step in (FACTOR_RATE, -FACTOR_RATE))
-    factor = effect.factor(rate, **shapes)
-    by_shape = term.by_shapes(theta, factor, lambda **shapes: effect.factor(rate, **shapes))
+    up, down = (effect.along(motion._replace(rate=motion.rate + v), **shapes) for v in (FACTOR_RATE, -FACTOR_RATE))
+    factor = effect.along(motion, **shapes)
+    by_shape = term.by_shapes(theta, factor, lambda **shapes: effect.along(motion, **shapes))
     return factor, (up - down) / (2.0 * FACTOR_RATE), by_shape

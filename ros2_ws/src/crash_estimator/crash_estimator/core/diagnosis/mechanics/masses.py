@@ -56,8 +56,8 @@ def body_loads(
             yield BodyLoad(term, layout.structure.body_index[body], force, by_shapes)
 
 
-def attached_inertia(layout: Layout, record: ObservedRecord, trajectory: Trajectory) -> Callable[[str], np.ndarray]:
-    """Acceleration (g,) of an attached body that acts as inertia, by its channel.
+def measured_inertia(layout: Layout, record: ObservedRecord, trajectory: Trajectory) -> Callable[[str], np.ndarray]:
+    """Acceleration (g,) of what acts as inertia, by its channel: an attached body's, or as it was measured.
 
     Where noise stands for what is left of a structure that rings, its ringing is none: what counts is the band in
     which such outputs are compared.
@@ -66,7 +66,8 @@ def attached_inertia(layout: Layout, record: ObservedRecord, trajectory: Traject
     rigid = record.noise_is_inflated and step * SLOWEST <= 1.0
 
     def inertial(channel: str) -> np.ndarray:
-        a = trajectory.a[:, layout.attached[channel]]
+        body = layout.attached.get(channel)
+        a = record.signals[channel].on_grid if body is None else trajectory.a[:, body]
         return cfc_filter(a, step, CFC) if rigid else a
 
     return inertial

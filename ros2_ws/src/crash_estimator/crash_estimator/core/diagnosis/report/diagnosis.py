@@ -247,6 +247,7 @@ def _evidence(path: SelectionPath, told: _Told, structure: Structure) -> Evidenc
         needed=needed_share(path.added),
         place_of=structure.place_of,
         assumed=bool(_with_assumed_noise(path)),
+        varying=path.rival_in_time,
     )
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from ..residuals.score_test import Drift
 from ..selection.thresholds import THRESHOLDS
+from ..selection.time_varying import Varying
 from .left import Left
 from .ranking import Ranked
 from .tolerance import Tolerance
@@ -27,6 +28,7 @@ class Evidence(NamedTuple):
     needed: float = THRESHOLDS.most  # share that all of them must explain
     place_of: Callable[[str], Hashable] = str  # what two targets have in common that are the same place
     assumed: bool = False  # the noise is, of some channel: to be less than it says little
+    varying: Varying | None = None  # with time, and as likely as what was found
 
     @property
     def noise(self) -> bool:
@@ -42,15 +44,17 @@ class Verdict(NamedTuple):
 def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
     """`adequate`: nothing significant is missing, or nothing is named and what is left of the model as given is within
     the tolerance, and no candidate explains any of it or it is less than the noise, or the noise is assumed;
-    `effect_missing`: what is named beats its rivals and takes a large share of the misfit away; else `unexplained`."""
+    `effect_missing`: what is named beats its rivals, what varies with time too, and takes a large share of the misfit
+    away; else `unexplained`."""
     if (tolerance.stated or evidence.assumed) and tolerance.admits(evidence.before):
         return Verdict(ADEQUATE, True)
     if evidence.noise:
         word = EFFECT_MISSING if evidence.added else UNEXPLAINED if evidence.assumed else ADEQUATE
-        return Verdict(word if evidence.added <= THRESHOLDS.most_at_once else UNEXPLAINED, True)
+        too_many = evidence.added > THRESHOLDS.most_at_once
+        return Verdict(UNEXPLAINED if too_many or evidence.varying else word, True)
     within = tolerance.admits(evidence.after)
     still = _stands_still(evidence) or _leaves_next_to_nothing(evidence, within)
-    if _explains(evidence) and still and (within or _beats_its_rivals(evidence)):
+    if _explains(evidence) and still and not evidence.varying and (within or _beats_its_rivals(evidence)):
         return Verdict(EFFECT_MISSING, within)
     nothing_to_add = not (evidence.added or evidence.white) and _stands_still(evidence)
     little = tolerance.admits(evidence.before) and (nothing_to_add or evidence.before.is_less_than_noise)

@@ -100,7 +100,10 @@ def _in_the_band(model: Model) -> str:
 
 
 def _unexplained(evidence: Evidence, steps, first: Model, final: Model, floor: float) -> str:
-    names, size, drift = _names(steps), _size(first, final, floor), evidence.drift
+    names, size, drift, varying = _names(steps), _size(first, final, floor), evidence.drift, evidence.varying
+    if varying:
+        better = f"{names}: no better than" if names else "no candidate explains what is left as well as"
+        return f"{size}; {better} {varying.what} that varies with time, with {varying.explained:.0%} of the misfit"
     if evidence.white and drift.constant:  # several effects together
         return f"{names} together leave only noise; {size}; one effect of another kind is likelier than so many"
     along = f"{drift.what} that varies with time, as no candidate does"

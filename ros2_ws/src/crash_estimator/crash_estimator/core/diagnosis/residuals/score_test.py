@@ -57,6 +57,11 @@ class Drift(NamedTuple):
     share: float  # of the residual's square above that of noise, that it takes away
 
 
+def cosine(j: np.ndarray | int, longest: float, time: np.ndarray) -> np.ndarray:
+    """cos(j pi t / T); longest, time: T and t, s."""
+    return np.cos(np.pi * j * (time / longest))
+
+
 def drift_of(fitted: Fit) -> Drift:
     """The test of one fit, in the noise of its records."""
     layout = fitted.layout
@@ -108,7 +113,7 @@ def _normal_equations(fitted: Fit, free: np.ndarray) -> Normal:
     matrix, vector, cost, samples = np.zeros((size, size)), np.zeros(size), 0.0, 0
     longest = max(float(record.time[-1]) for record in fitted.problem.records)
     for experiment, trajectory in zip(fitted.problem.experiments, fitted.trajectories, strict=True):
-        modes = np.cos(np.pi * np.arange(1, MODES + 1) * (experiment.record.time / longest)[:, None])
+        modes = cosine(np.arange(1, MODES + 1), longest, experiment.record.time[:, None])
         equations = linearise(experiment, fitted.theta, trajectory)
         equations = _with_motion(equations, _accelerated(equations, free), modes.T, layout.size)
         out = whitened(experiment, fitted.theta, trajectory, equations, in_time=False)

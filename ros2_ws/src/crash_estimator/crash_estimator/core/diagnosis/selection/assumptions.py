@@ -29,6 +29,7 @@ from .search_limit import search_is_over
 from .selection_path import SelectionPath, in_the_sensors_noise
 from .selection_step import sized_models
 from .thresholds import THRESHOLDS
+from .time_varying import likeliest_in_time
 
 FINER_CELLS = 2 * CELLS
 """Cells of half the width, where what is left may be folds that those are too wide for."""
@@ -37,6 +38,19 @@ FINER_CELLS = 2 * CELLS
 def select(structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]) -> SelectionPath:
     """The effects that a structure lacks, in the band below its vibration. Raises ModelError where it names an effect
     that there is not."""
+    path = _in_the_best_band(structure, records, effects)
+    return _with_rival_in_time(path) if path.added and not search_is_over() else path
+
+
+def _with_rival_in_time(path: SelectionPath) -> SelectionPath:
+    magnitudes, given = measure_magnitudes(path.structure, path.records, path.cells), path.steps[0].before
+    as_recorded = in_the_sensors_noise(given, path.records)
+    return path._replace(varying=likeliest_in_time(magnitudes, given, as_recorded, path.as_recorded.cost))
+
+
+def _in_the_best_band(
+    structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect]
+) -> SelectionPath:
     path = _selected(structure, records, effects)
     if path.final.white or search_is_over():
         return path
@@ -84,7 +98,7 @@ def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: 
     tried = [structure]
     untried: list[Callable[[Structure], Structure]] = [never_pulling, elastic_when_spent, all_when_spent]
     path = _as_exact_as_needed(structure, records, effects, lambda begun: _rings(begun) or bool(promised(begun)))
-    while untried and not search_is_over() and (others := promised(path)):
+    while untried and not (search_is_over() or path.given_up) and (others := promised(path)):
         best = max(others, key=others.__getitem__)
         untried.remove(best)
         otherwise = _as_exact_as_needed(best(path.structure), path.records, effects, _rings)
@@ -152,9 +166,15 @@ def _with_curves_as_fine_as_needed(
     structure, records = magnitudes.structure, magnitudes.records
     cells, first = magnitudes.cells, first_step(magnitudes, effects, given)
     if not (first.leaves_noise or search_is_over()):
-        begun = SelectionPath(structure, [first], given, given.fit, records, cells, whole=False)
+        varying = likeliest_in_time(magnitudes, given, given.fit)
+        much_less = varying and varying.leaves_much_less([one.fit for one in first.as_recorded if one.fit])
+        begun = SelectionPath(
+            structure, [first], given, given.fit, records, cells, False, varying if much_less else None
+        )
         if elsewhere(begun):
             return begun
+        if much_less:
+            return begun._replace(whole=True)
     steps, final = forward_selection(magnitudes, effects, given, first)
     as_recorded = in_the_sensors_noise(sized_models(steps, final)[-1], records)
     finer = measure_magnitudes(structure, records, FINER_CELLS)

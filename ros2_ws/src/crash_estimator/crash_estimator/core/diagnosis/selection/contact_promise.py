@@ -43,7 +43,7 @@ def promised_by(other: Structure, path: SelectionPath, likely: Iterable[tuple[Se
         if what in seen:
             continue
         seen.add(what)
-        otherwise = _fitted_slowly(magnitudes, records, additions, path.furthest.cost + THRESHOLDS.hopeless)
+        otherwise = _fitted_slowly(magnitudes, records, additions, path.least_cost + THRESHOLDS.hopeless)
         misfit = 0.5 * max(as_recorded.cost - cost_of_noise(records), 0.0)  # nats
         # what stays behind the best of all must gain most of what it lacked
         share = THRESHOLDS.some if otherwise.evidence > first else THRESHOLDS.half
@@ -74,7 +74,7 @@ def likely_first(path: SelectionPath) -> Iterator[tuple[Sequence[Addition], Fit]
     fitted = [*first.doubted, *(one for one in first.as_recorded if one.fit)]
     if path.final.white:
         fitted = [one for one in fitted if one.gain > (1.0 - THRESHOLDS.some) * fitted[0].gain]
-    hopeless = path.furthest.cost + THRESHOLDS.hopeless
+    hopeless = path.least_cost + THRESHOLDS.hopeless
     for one in fitted:  # from where it began: what it has come to may be what made up for the contact
         yield (*first.before.additions, one.addition), one.fit
         for other in _in_other_forms(one.addition):

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from ...effects.effect import Addition
 from ...structure import Structure
 from ..observation.record import ObservedRecord
@@ -12,6 +14,7 @@ from .acceptance import share_removed
 from .fitted_model import Model
 from .selection_step import SelectionStep
 from .thresholds import THRESHOLDS
+from .time_varying import Varying
 
 
 class SelectionPath(NamedTuple):
@@ -24,6 +27,22 @@ class SelectionPath(NamedTuple):
     records: Sequence[ObservedRecord]  # in the band that was compared
     cells: int  # of the final model's curves
     whole: bool = True  # False: it ends before its first addition, as other assumptions promise more
+    varying: Varying | None = None  # what may vary with time instead, of the model as given
+
+    @property
+    def given_up(self) -> bool:
+        """Before its first addition, for what varies with time."""
+        return bool(self.whole and self.varying and not self.added)
+
+    @property
+    def rival_in_time(self) -> Varying | None:
+        """It, where what was found is not likelier, near the noise, or leaves much more: neither is told then."""
+        found, varying = self.as_recorded, self.varying
+        if varying is None:
+            return None
+        if self.final.residuals.mean_square >= THRESHOLDS.near_floor:
+            return varying if varying.leaves_much_less([found]) else None
+        return varying if varying.fit.evidence > found.evidence - THRESHOLDS.confounded else None
 
     @property
     def noise(self) -> bool:
@@ -33,6 +52,11 @@ class SelectionPath(NamedTuple):
     @property
     def added(self) -> Sequence[Addition]:
         return self.final.found
+
+    @property
+    def least_cost(self) -> float:
+        """Of all that was fitted, in the sensors' noise."""
+        return min(self.furthest.cost, self.varying.fit.cost if self.varying else np.inf)
 
     @property
     def furthest(self) -> Fit:

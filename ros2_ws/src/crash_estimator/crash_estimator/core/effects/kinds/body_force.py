@@ -40,7 +40,7 @@ class BodyForce(Effect):
     def possible_targets(self, structure, test):
         return [body.name for body in structure.bodies if body.free]
 
-    def trial(self, motion, **shapes):
+    def along(self, motion, **shapes):
         return self.force(motion.time, **shapes)
 
     def put_to_work(self, structure, test, spec):

@@ -32,7 +32,7 @@ class StaticFactor(Effect):
     def stated_limits(self):
         return 0.0, np.inf
 
-    def trial(self, motion, **shapes):
+    def along(self, motion, **shapes):
         return self.factor(motion.rate, **shapes)
 
     def put_to_work(self, structure, test, spec):
