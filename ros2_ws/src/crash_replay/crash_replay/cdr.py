@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 from rclpy.serialization import serialize_message
 
+from .time_unit import SECOND
+
 PLAIN = bytes([0, 1, 0, 0])
 """Plain CDR, little-endian: what a message begins with (RTPS 2.2, 10.2.1.2)."""
 NUMBERS = {"uint8": "u1", "int32": "<i4", "uint32": "<u4", "int64": "<i8", "uint64": "<u8", "double": "<f8"}
 STAMP = struct.Struct("<iI")
-SECOND = 1_000_000_000
 
 
 def aligned(at: int, size: int) -> int:

@@ -12,6 +12,7 @@ import numpy as np
 from . import limits
 from .message_types import typestore
 from .recording import Channel, RecordingError
+from .time_unit import SECOND
 
 
 class Carrier(NamedTuple):
@@ -33,7 +34,6 @@ CARRIERS = {
 """By quantity; the channel's axis (x where it has none) is the component that is used."""
 
 AXES = ("", "x", "y", "z")
-SECOND = 1_000_000_000
 FRONT = 4 + 8 + 4
 """Bytes in front of the frame's name: encapsulation, stamp, length of the name."""
 

@@ -62,6 +62,16 @@ class Onset(NamedTuple):
     precision_ns: int  # that the noise allows
     differs: bool  # from the stated time zero by more than it can be wrong
 
+    @property
+    def time(self) -> float:
+        """s."""
+        return self.time_ns * 1e-9
+
+    @property
+    def precision(self) -> float:
+        """s."""
+        return self.precision_ns * 1e-9
+
 
 class _Alarm(NamedTuple):
     """What means over one run say."""

@@ -16,9 +16,9 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from .fault import Fault
+from .time_unit import SECOND
 
 LOWEST_RATE, HIGHEST_RATE = 0.001, 1000.0
-SECOND = 1_000_000_000
 SINGLES, BLOCKS = 1000.0, 400.0
 """Messages a second: at most of one sample each, and about so many of several."""
 NOW = 1.0

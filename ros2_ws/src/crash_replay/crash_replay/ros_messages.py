@@ -14,8 +14,8 @@ from .bag import time_zero_ns
 from .channel_messages import CARRIERS, component, frame_id
 from .message_types import test_from_msg as test_from_msg  # also of a bag
 from .recording import Channel, Recording, RecordingError, Sample
+from .time_unit import SECOND
 
-SECOND = 1_000_000_000
 ChannelMessage = AccelStamped | PointStamped | TwistStamped | WrenchStamped
 CHANNEL_TYPES = {
     "geometry_msgs/msg/AccelStamped": AccelStamped,

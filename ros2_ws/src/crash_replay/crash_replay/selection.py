@@ -11,8 +11,7 @@ import numpy as np
 
 from .fault import Fault
 from .recording import Recording
-
-SECOND = 1_000_000_000
+from .time_unit import SECOND
 
 
 class SelectionError(Fault):

@@ -4,11 +4,11 @@ from datetime import UTC, datetime
 
 from ..limits import STAMP, UNDATED
 from ..recording import RecordingError
+from ..time_unit import SECOND
 
 FORMS = ("%Y-%m-%d", "%d.%m.%Y", "%d/%b/%Y", "%Y/%m/%d")
 """ISO 8601, as in ISO-MME; German; NHTSA's 03/OCT/2017."""
 TIMES = ("", " %H:%M:%S", "T%H:%M:%S", " %H:%M", "T%H:%M")
-SECOND = 1_000_000_000
 
 
 def stamp_of(date: str) -> int:

@@ -12,6 +12,7 @@ import numpy as np
 
 from crash_replay.conditioning import RESTS_AT_ZERO
 from crash_replay.recording import SI_UNIT, Recording, Test
+from crash_replay.time_unit import SECOND
 
 from ...derived_motion import between_samples, smoothed
 from ...kinematics import Kinematics, zero_crush
@@ -195,7 +196,7 @@ def observe(structure: Structure, recording: Recording, rest: Rest | None = None
         raise ModelError(
             f"test {recording.test.id} has {np.count_nonzero(after)} samples after the impact, too few to fit"
         )
-    sample_time = recording.time_ns[after] * 1e-9
+    sample_time = recording.time[after]
     time, at = grid_of(sample_time, longest_step(structure, recording))
     outputs = outputs_of(structure)
     names = [name for _, name, _ in structure.channels()]
@@ -275,6 +276,6 @@ def _signal(recording: Recording, name: str, grid: np.ndarray, rest: Rest, deriv
 
 
 def _from_rest(crush: Signal, tension: bool, rest_ends: int) -> Signal:
-    before = crush.values[crush.time * 1e9 < rest_ends]
+    before = crush.values[crush.time * SECOND < rest_ends]
     zero = zero_crush(float(before.mean()), float(before[-1]), tension) if len(before) else 0.0
     return crush._replace(values=crush.values - zero, on_grid=crush.on_grid - zero)

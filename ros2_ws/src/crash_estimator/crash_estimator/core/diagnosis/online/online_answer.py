@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from crash_replay.time_unit import SECOND
+
 from ...structure import EffectSpec
 from ..observation.record import ObservedRecord
 from ..parameterization.layout import Layout
@@ -81,7 +83,7 @@ def curves(layout: Layout, record: ObservedRecord, predicted: np.ndarray, effect
         effects,
         tuple(o.channel if bodies.count(body) > 1 else body for o, body in zip(layout.outputs, bodies)),
         tuple(output.unit for output in layout.outputs),
-        np.round(record.time[record.at] * 1e9).astype(np.int64),
+        np.round(record.time[record.at] * SECOND).astype(np.int64),
         record.measured,
         predicted,
         record.noise,

@@ -4,13 +4,11 @@ A small change of the parameters moves the bodies by xi, which obeys the linear 
 
     M_k xi''_k = sum over links of -+ (kx xi_X + kv xi_V + kp xi_peak + sum of dF/dz xi_z + dF/dtheta) + external,
 
-along the trajectory about which the forces were linearised. Every column of the result is one parameter; column
-0 is driven by the defect, the amount by which the trajectory itself misses the equations of motion, so that a
-trajectory that is not a simulation yet (the measured motion, to begin with) is corrected to first order.
-Time steps follow `kinematics`: the acceleration is a straight line within a step (Newmark, beta 1/6, gamma 1/2).
-
-Loops go through whole arrays by index, and what is called in every step is put in its place (inline): slices, and
-NamedTuples or many arrays handed on, would cost more than the arithmetic.
+along the trajectory about which the forces were linearised. Each column is one parameter; column 0 is driven by the
+defect, by which the trajectory itself misses the equations of motion: one that is no simulation yet (the measured
+motion, to begin with) is corrected to first order. Time steps follow `kinematics`: the acceleration is a straight line
+within a step (Newmark, beta 1/6, gamma 1/2). Loops go through whole arrays by index, and what is called in every step
+is put in its place (inline): slices, and NamedTuples handed on, would cost more than the arithmetic.
 """
 
 import numpy as np
@@ -32,9 +30,10 @@ def _whole(columns):
 @njit(cache=True, fastmath=True, error_model="numpy")
 def propagate(system, sampling, out):
     """Fill out (bins, q, columns); system: a `linear_system.Linear`, sampling: its `Sampling`."""
-    steps, ends, crush_ends, inverse_mass, kind, kx, kv, kp, loading, knot, weight = system[:11]
-    changed, start, observer, others, column, body, acts, remembers, kept, by_crush, by_before, recalled = system[11:23]
-    touched = system[23]
+    (
+        steps, ends, crush_ends, inverse_mass, kind, kx, kv, kp, loading, knot, weight,
+        changed, start, observer, others, column, body, acts, remembers, kept, by_crush, by_before, recalled, touched,
+    ) = system  # fmt: skip
     b, links, columns = len(kind), len(ends), _whole(others + touched[-1])
     x, v, a = np.zeros((b, columns)), np.zeros((b, columns)), np.zeros((b, columns))
     peak, row = np.zeros((links, columns)), np.zeros((b, columns))
@@ -165,12 +164,13 @@ def respond(system, change):
 
     One column needs no loops over columns, and so a fourth of the time.
     """
-    steps, ends, crush_ends, inverse_mass, kind, kx, kv, kp, loading, knot, weight = system[:11]
-    changed, start, observer, others, column, body, acts, remembers, kept, by_crush, by_before, recalled = system[11:23]
+    (
+        steps, ends, crush_ends, inverse_mass, kind, kx, kv, kp, loading, knot, weight,
+        changed, start, observer, others, column, body, acts, remembers, kept, by_crush, by_before, recalled, _,
+    ) = system  # fmt: skip
     b, links = len(kind), len(ends)
     x, v, a, row, peak = np.zeros(b), np.zeros(b), np.zeros(b), np.zeros(b), np.zeros(links)
-    memory = np.zeros(len(remembers))
-    number, free = np.full(b, -1), 0
+    memory, number, free = np.zeros(len(remembers)), np.full(b, -1), 0
     for k in range(b):
         if kind[k] == FREE:
             number[k] = free

@@ -31,7 +31,7 @@ from .fitted_constants import FittedConstant, fitted_constants
 from .left import Left, left_by
 from .ranking import Ranked, StepReport, ranking_of, step_of
 from .time_zero_step import TIME_ZERO, as_ranked, signals_begin, time_zero_step
-from .tolerance import DEFAULT, Tolerance
+from .tolerance import DEFAULT, Tolerance, percent
 from .verdict import ADEQUATE, EFFECT_MISSING, UNEXPLAINED, Evidence, verdict_on
 from .verdict_text import verdict_text
 
@@ -120,7 +120,7 @@ def diagnose(
     if assumed := _with_assumed_noise(begun.path):
         remarks.append(
             f"of {', '.join(assumed)} too little is recorded at rest to tell the noise behind a filter: it is taken "
-            f"for {100.0 * ASSUMED:g} % of the peak; record 20 ms before time zero, or state it (`noise` of a body)"
+            f"for {percent(ASSUMED)} of the peak; record 20 ms before time zero, or state it (`noise` of a body)"
         )
     elsewhere = {shift.test: shift.seconds for shift in begun.unused if shift.off(0.0)}  # whatever a filter shows early
     if elsewhere:

@@ -8,6 +8,10 @@ from .left import Left
 EXAMPLES = "a rating from 0 to 1, as in 0.8, or a share of the peak, as in 5%"
 
 
+def percent(share: float, digits: int = 3) -> str:
+    return f"{100.0 * share:.{digits}g} %"
+
+
 class Tolerance(NamedTuple):
     """What may be left in every channel of every recording: one of the two."""
 
@@ -24,7 +28,7 @@ class Tolerance(NamedTuple):
     def text(self) -> str:
         if self.rating is not None:
             return f"a rating of {self.rating:g}"
-        return f"{100.0 * self.of_peak:.3g} %" + ("" if self.stated else " (the default of --good-enough)")
+        return percent(self.of_peak) + ("" if self.stated else " (the default of --good-enough)")
 
     def as_json(self) -> dict:
         return self._asdict()

@@ -12,7 +12,7 @@ from ..selection.thresholds import THRESHOLDS
 from .left import Left, vibration_of
 from .ranking import StepReport
 from .time_zero_step import TIME_ZERO, signals_begin
-from .tolerance import Tolerance
+from .tolerance import Tolerance, percent
 from .verdict import ADEQUATE, EFFECT_MISSING, Evidence, Verdict
 
 LASTING = {SPRINGS: "elastic forces that act on", ALL: "all forces that act on, dampers' too,"}
@@ -60,7 +60,7 @@ def _masses_otherwise(final: Model) -> list[str]:
     layout, theta = final.fit.layout, final.fit.theta
     off = {layout.bodies[k]: float(theta[parameter]) for k, parameter in layout.weighed.items()}
     words = [
-        f"{name} {100.0 * abs(share):.2g} % {'heavier' if share > 0.0 else 'lighter'}"
+        f"{name} {percent(abs(share), 2)} {'heavier' if share > 0.0 else 'lighter'}"
         for name, share in off.items()
         if abs(share) > 2.0 * WEIGHED_TO
     ]
@@ -140,7 +140,7 @@ def _what_is_left(left: Left) -> str:
     if not left.channels:
         return "what is left"
     worst = left.channels[0]
-    return f"what is left, {100.0 * worst.of_peak:.3g} % of the peak of {worst.channel}"
+    return f"what is left, {percent(worst.of_peak)} of the peak of {worst.channel}"
 
 
 def _unloads(model: Model) -> bool:

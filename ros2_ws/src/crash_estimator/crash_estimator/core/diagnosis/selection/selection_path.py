@@ -42,7 +42,7 @@ class SelectionPath(NamedTuple):
             return None
         if self.final.residuals.mean_square >= THRESHOLDS.near_floor:
             return varying if varying.leaves_much_less([found]) else None
-        return varying if varying.fit.evidence > found.evidence - THRESHOLDS.confounded else None
+        return varying if varying.fit.evidence > found.evidence - THRESHOLDS.gain else None
 
     @property
     def noise(self) -> bool:

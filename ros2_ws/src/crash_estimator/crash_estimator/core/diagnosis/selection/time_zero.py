@@ -17,6 +17,7 @@ import numpy as np
 
 from crash_replay.onset import AS_WELL, find_onset
 from crash_replay.recording import Recording
+from crash_replay.time_unit import SECOND
 
 from ..output_error.gauss_newton import Fit
 from ..parameterization.layout import FARTHEST
@@ -77,14 +78,14 @@ def onsets(recordings: Sequence[Recording]) -> tuple[Shift, ...]:
     for k, recording in enumerate(recordings):
         onset, period = find_onset(recording), recording.sample_period
         if onset is not None:
-            std = max(onset.precision_ns * 1e-9 * AS_WELL**-0.5, period * BETWEEN)
-            shifts.append(Shift(k, recording.test.id, onset.time_ns * 1e-9, std, period, onset.differs))
+            std = max(onset.precision * AS_WELL**-0.5, period * BETWEEN)
+            shifts.append(Shift(k, recording.test.id, onset.time, std, period, onset.differs))
     return tuple(shifts)
 
 
 def moved_by(shifts: Sequence[Shift], recordings: Sequence[Recording]) -> list[Recording]:
     """With time zero at their onsets."""
-    by = {shift.recording: round(shift.seconds * 1e9) for shift in shifts}
+    by = {shift.recording: round(shift.seconds * SECOND) for shift in shifts}
     return [Recording(r.test, r.time_ns - by.get(k, 0), r.values) for k, r in enumerate(recordings)]
 
 
