@@ -5,10 +5,12 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from rclpy.serialization import deserialize_message
 
-from crash_estimator.fuzz import command, worker
-from crash_estimator.fuzz.targets import TARGETS, Target
+from crash_estimator.fuzz import command, mutations, worker
+from crash_estimator.fuzz.targets import REQUEST, TARGETS, Target
 from crash_estimator.fuzz.worker import Slow, input_of, tried
+from crash_replay.cdr import PLAIN
 
 EACH = 25
 NODES = ("estimator node", "diagnosis node")
@@ -27,6 +29,14 @@ def test_spoilt_input_is_taken_or_refused_with_one_line(target, monkeypatch):
 def test_a_seed_makes_the_same_input_again(target):
     assert input_of(target, "a") == input_of(target, "a")
     assert any(input_of(target, "a") != input_of(target, seed) for seed in "bcd")
+
+
+def test_what_the_memory_held_between_the_fields_of_a_message_is_no_part_of_it():
+    clean = mutations.serialized(REQUEST)
+    dirty, gap = bytearray(clean), clean.index(b"coulomb_friction\0") + len(b"coulomb_friction\0")
+    dirty[gap] = 0xBE
+    assert deserialize_message(bytes(dirty), type(REQUEST)) == REQUEST == deserialize_message(clean, type(REQUEST))
+    assert mutations._zero_gaps(REQUEST, dirty, len(PLAIN)) == len(clean) and dirty == clean
 
 
 def endless(_: Path) -> None:

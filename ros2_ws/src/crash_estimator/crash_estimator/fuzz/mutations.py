@@ -9,7 +9,13 @@ from typing import Any
 
 from rclpy.serialization import serialize_message
 
+from crash_replay.cdr import NUMBERS as SERIALIZED
+from crash_replay.cdr import PLAIN, aligned
+
 from .valid import Files
+
+SIZES = {"boolean": 1} | {kind: int(name[-1]) for kind, name in SERIALIZED.items()}
+"""Bytes of a number."""
 
 NUMBERS = (
     "0", "-0", "-1", "1", "1e10", "-1e10", "1e30", "1e100", "1e308", "-1e308", "1e309", "1e-308", "5e-324", "nan",
@@ -171,12 +177,43 @@ def spoilt_message(rng: Random, message: Any) -> bytes:
     message = deepcopy(message)
     for _ in range(rng.choice((0, 1, 1, 2, 4))):
         _spoil_field(rng, message)
-    raw = bytes(serialize_message(message))
+    raw = serialized(message)
     if rng.random() < 0.25:
         raw = spoilt_bytes(rng, raw)
     if rng.random() < 0.02:
         raw = rng.randbytes(rng.choice((0, 1, 4, 40, 4000)))
     return raw
+
+
+def serialized(message: Any) -> bytes:
+    """Its bytes, with zeros where the next number or text begins at a multiple of its size: rclpy leaves there what the
+    memory held, and a seed is to make the same input again."""
+    raw = bytearray(serialize_message(message))
+    _zero_gaps(message, raw, len(PLAIN))
+    return bytes(raw)
+
+
+def _zero_gaps(message: Any, raw: bytearray, at: int) -> int:
+    """Of a message that begins at `at` -> where it ends."""
+
+    def at_multiple_of(size: int) -> int:
+        begins = aligned(at, size)
+        raw[at:begins] = bytes(begins - at)
+        return begins
+
+    for field, kind in message.get_fields_and_field_types().items():
+        elements = [getattr(message, field)]
+        if kind.startswith("sequence<"):
+            kind, (elements,) = kind.removeprefix("sequence<").removesuffix(">"), elements
+            at = at_multiple_of(4) + 4
+        for element in elements:
+            if kind == "string":
+                at = at_multiple_of(4) + 4 + len(element.encode()) + 1
+            elif "/" in kind:
+                at = _zero_gaps(element, raw, at)
+            else:
+                at = at_multiple_of(SIZES[kind]) + SIZES[kind]
+    return at
 
 
 def _spoil_field(rng: Random, message: Any) -> None:
