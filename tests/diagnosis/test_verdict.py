@@ -17,7 +17,6 @@ from crash_estimator.core.diagnosis.report.tolerance import DEFAULT, Tolerance, 
 from crash_estimator.core.diagnosis.report.verdict import Evidence, verdict_on
 from crash_estimator.core.diagnosis.residuals.in_band import InBand
 from crash_estimator.core.diagnosis.residuals.score_test import Drift
-from crash_estimator.core.diagnosis.selection import search_limit
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.structure import Coefficient, ModelError
 from crash_estimator.model_file import load_model
@@ -258,18 +257,6 @@ def test_a_time_limit_gives_the_best_answer_so_far(frontal):
     assert len(hurried.ranking) >= 3 and not any(one.fitted for one in hurried.ranking)  # screened, and said to be so
 
 
-def test_a_search_ends_after_a_number_of_iterations_unless_a_time_is_stated(monkeypatch):
-    structure, recordings = load_model("frontal_single"), [read_bag(FRONTAL)]
-    monkeypatch.setattr(search_limit, "LONGEST_SEARCH", 120)
-    for _ in range(2):  # those of the search before do not count
-        hurried = diagnose(structure, recordings)
-        assert hurried.stopped and "stopped after 120 iterations" in hurried.text
-        fitted = [one.fitted for one in hurried.ranking]
-        assert any(fitted) and not all(fitted)
-    whole = diagnose(structure, recordings, seconds=float("inf"))
-    assert not whole.stopped and "stopped" not in whole.text
-
-
 @pytest.mark.parametrize("value", [4.9, 0.0])
 def test_a_channel_that_never_changes_is_one_line(value):
     """It has no noise; the search ended in a fault of the program."""
@@ -278,29 +265,3 @@ def test_a_channel_that_never_changes_is_one_line(value):
     values[:, recording.test.index("car_ax")] = value
     with pytest.raises(ModelError, match=rf"channel car_ax is {value:g} m/s\^2 throughout, as of a dead sensor: leave"):
         diagnose(load_model("frontal_single"), [Recording(recording.test, recording.time_ns, values)])
-
-
-def test_a_time_limit_is_above_zero(monkeypatch, capsys):
-    for wrong in ("0", "-1", "nan", "soon"):
-        monkeypatch.setattr("sys.argv", ["diagnose", str(FRONTAL), "--model", "frontal_single", "--time-limit", wrong])
-        with pytest.raises(SystemExit) as ended:
-            command.main()
-        assert ended.value.code == 2 and "seconds above 0" in capsys.readouterr().err
-
-
-def test_a_search_within_another_has_half_of_what_that_has_left(monkeypatch):
-    made = [100]
-    monkeypatch.setattr(search_limit, "iterations_made", lambda: made[0])
-    monkeypatch.setattr(search_limit, "LONGEST_SEARCH", 1000)
-    with search_limit.search_limit(None):
-        made[0] = 500  # 600 are left
-        with search_limit.half_of_what_is_left():
-            made[0] = 800
-            assert not search_limit.search_is_over()
-            made[0] = 801
-            assert search_limit.search_is_over()
-        assert not search_limit.search_is_over()
-        made[0] = 1101
-        assert search_limit.search_is_over()
-    with search_limit.search_limit(np.inf), search_limit.half_of_what_is_left():
-        assert not search_limit.search_is_over()
