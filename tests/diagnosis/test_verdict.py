@@ -18,6 +18,7 @@ from crash_estimator.core.diagnosis.report.verdict import Evidence, verdict_on
 from crash_estimator.core.diagnosis.residuals.in_band import InBand
 from crash_estimator.core.diagnosis.residuals.score_test import Drift
 from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.effects.effect import Addition
 from crash_estimator.core.structure import Coefficient, ModelError
 from crash_estimator.model_file import load_model
 from crash_replay.bag import read_bag
@@ -40,6 +41,7 @@ def ranked(effect: str, target: str, evidence: float, explained: float = 0.1, fi
 
 
 LEADER = ranked("coulomb_friction", "car_barrier", 50.0, explained=0.9)
+GAINS_LITTLE = (replace(LEADER, evidence=15.0),)
 BEYOND_DOUBT = replace(LEADER, evidence=1000.0)
 HARDLY_MORE = BEYOND_DOUBT, ranked("clearance", "engine", 960.0, explained=0.86)
 HALF_AS_MUCH_AGAIN = BEYOND_DOUBT, ranked("clearance", "engine", 960.0, explained=0.84)
@@ -67,6 +69,9 @@ LITTLE, DROWNED = left(0.009, 1.0), left(0.009, 0.13)
         ({"varying": "a force on car", "white": True, "drift": NOTHING_VARIES}, DEFAULT, "unexplained", True),
         ({"weighed": False}, DEFAULT, "unexplained", False),
         ({"certain": False}, DEFAULT, "unexplained", False),
+        ({"added": 2}, DEFAULT, "effect_missing", False),
+        ({"added": 2, "one_law": True}, DEFAULT, "unexplained", False),  # the first terms of another law
+        ({"added": 2, "one_law": True, "white": True, "drift": NOTHING_VARIES}, DEFAULT, "effect_missing", True),
         ({"added": 3}, DEFAULT, "unexplained", False),
         ({"ranking": (LEADER, ranked("clearance", "engine", 45.0))}, DEFAULT, "unexplained", False),
         ({"ranking": (LEADER, ranked("clearance", "engine", 45.0, fitted=False))}, DEFAULT, "effect_missing", False),
@@ -84,7 +89,8 @@ LITTLE, DROWNED = left(0.009, 1.0), left(0.009, 0.13)
         ({"drift": VARIES, "after": left(0.009, 0.9), "added": 2}, DEFAULT, "unexplained", False),
         ({"added": 0, "before": LITTLE, "after": LITTLE}, DEFAULT, "adequate", True),
         ({"before": LITTLE, "after": LITTLE}, DEFAULT, "unexplained", False),  # something was added, to no avail
-        ({"before": DROWNED, "after": DROWNED}, DEFAULT, "adequate", True),
+        ({"before": DROWNED, "after": DROWNED, "ranking": GAINS_LITTLE}, DEFAULT, "adequate", True),
+        ({"before": DROWNED, "after": DROWNED}, DEFAULT, "unexplained", False),  # though a candidate gains 50 nats
         ({"before": LITTLE, "after": LITTLE, "added": 0, "white": True}, DEFAULT, "unexplained", False),  # and varies
         ({"added": 0, "after": left(0.05, 1.0)}, DEFAULT, "unexplained", False),
         ({"before": left(0.04, 1.0), **MENDED}, DEFAULT, "effect_missing", False),
@@ -108,7 +114,8 @@ def test_evidence_is_weighed_in_noise_as_large_as_what_is_left_or_where_next_to_
     """Of 10 m/s^2 as given; the sensors' noise is 0.1."""
     given = SimpleNamespace(fit=None)
     fit = SimpleNamespace(problem=SimpleNamespace(noise_is_inflated=inflated))
-    final = SimpleNamespace(fit=fit, white=False, additions=("friction",))
+    friction = Addition(EFFECTS["coulomb_friction"], "car_barrier")
+    final = SimpleNamespace(fit=fit, white=False, additions=(friction,))
     path = SimpleNamespace(
         steps=[SimpleNamespace(before=given, sized=given)],
         final=final,
@@ -137,6 +144,19 @@ def test_evidence_is_weighed_in_noise_as_large_as_what_is_left_or_where_next_to_
         report._answer(SimpleNamespace(place_of=str), path, DEFAULT, None)
     (evidence,) = found.value.args
     assert evidence.weighed == weighed
+
+
+@pytest.mark.parametrize(
+    ("effect", "coefficient", "std", "certain"),
+    [
+        ("channel_gain", 0.08, 0.01, True), ("channel_gain", 0.1, 0.01, False), ("channel_gain", -0.1, 0.01, False),
+        ("channel_gain", 0.08, 0.09, False), ("coulomb_friction", 1e6, 1e3, True),
+    ],
+)  # fmt: skip
+def test_what_is_certain_is_beyond_its_standard_deviation_and_short_of_its_limits(effect, coefficient, std, certain):
+    steps = (SimpleNamespace(coefficient=coefficient, std=std),)
+    told = SimpleNamespace(added=steps, steps=steps)
+    assert report._certain([Addition(EFFECTS[effect], "target")], told) == certain
 
 
 @pytest.mark.parametrize(("effects", "share"), [

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import isclose
 from typing import NamedTuple
 
 from crash_replay.recording import Recording
@@ -27,6 +28,7 @@ from ..selection.selection_path import SelectionPath, up_to
 from ..selection.selection_step import band_of_steps, fit_of_all, sized_models
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_zero import TimeZero
+from ..selection.wrong_units import refuse_wrong_units
 from .fitted_constants import FittedConstant, fitted_constants
 from .left import Left, left_by
 from .ranking import Ranked, StepReport, ranking_of, step_of
@@ -109,12 +111,15 @@ def diagnose(
     if not recordings:
         raise ModelError("a diagnosis needs at least one recording")
     recordings, faults = without_faults(recordings)
+    stated = structure, recordings
     structure, recordings = with_accelerations(structure, recordings)
     for recording in recordings:
         refuse_dead_channels(structure, recording)
     with search_limit(seconds):
         begun = select_from_the_onset(structure, recordings, effects)
         stopped = search_is_over()
+    if not (stopped or begun.path.noise):
+        refuse_wrong_units(*stated, begun.path.steps[0].before, effects)
     found = _answer(structure, begun.path, tolerance, begun.zero)
     remarks = [faults] if faults else []
     if assumed := _with_assumed_noise(begun.path):
@@ -234,6 +239,7 @@ def _evidence(path: SelectionPath, told: _Told, structure: Structure) -> Evidenc
     before, after = left_by(told.given, told.band), left_by(told.final, told.band)
     from_there_on = told.models[len(told.moved) :]
     inflated = told.final.fit.problem.noise_is_inflated
+    laws = [structure.place_of(one.target) for one in path.added if one.effect.acts_on in ("element", "between")]
     return Evidence(
         added=len(path.added) or len(told.steps),  # a time zero is none of the effects that may be too many
         white=told.final.white,
@@ -242,13 +248,22 @@ def _evidence(path: SelectionPath, told: _Told, structure: Structure) -> Evidenc
         after=after,
         ranking=told.ranking,
         weighed=inflated or after.share_explained(before) > THRESHOLDS.nearly_all,
-        certain=all(abs(one.coefficient) > one.std for one in told.steps),
+        certain=_certain(path.added, told),
+        one_law=len(set(laws)) < len(laws),
         by_first=_explained_by_first_effect(from_there_on, path.added, told.band),
         needed=needed_share(path.added),
         place_of=structure.place_of,
         assumed=bool(_with_assumed_noise(path)),
         varying=path.rival_in_time,
     )
+
+
+def _certain(added: Sequence[Addition], told: _Told) -> bool:
+    """Every coefficient is beyond its standard deviation, and short of the largest that its effect can have: what a
+    limit holds back stands for something else."""
+    ends = [(step.coefficient, one.effect) for step, one in zip(told.added, added, strict=True)]
+    held = any(isclose(found, limit) for found, effect in ends for limit in (effect.low, effect.high))
+    return not held and all(abs(one.coefficient) > one.std for one in told.steps)
 
 
 def _fit_of_all(path: SelectionPath) -> Fit:

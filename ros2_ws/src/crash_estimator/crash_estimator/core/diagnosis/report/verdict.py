@@ -23,12 +23,13 @@ class Evidence(NamedTuple):
     after: Left  # with what was added
     ranking: Sequence[Ranked]  # of the first step
     weighed: bool  # the evidence was taken in a noise as large as what is left
-    certain: bool  # every coefficient that was added is beyond its standard deviation
+    certain: bool  # every coefficient that was added is beyond its standard deviation, and short of its limits
     by_first: float = 0.0  # share of the misfit in the band that the first effect explains, wherever it is missing
     needed: float = THRESHOLDS.most  # share that all of them must explain
     place_of: Callable[[str], Hashable] = str  # what two targets have in common that are the same place
     assumed: bool = False  # the noise is, of some channel: to be less than it says little
     varying: Varying | None = None  # with time, and as likely as what was found
+    one_law: bool = False  # two effects are laws of one element
 
     @property
     def noise(self) -> bool:
@@ -43,7 +44,8 @@ class Verdict(NamedTuple):
 
 def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
     """`adequate`: nothing significant is missing, or nothing is named and what is left of the model as given is within
-    the tolerance, and no candidate explains any of it or it is less than the noise, or the noise is assumed;
+    the tolerance, and no candidate explains any of it or it is less than the noise and no candidate gains much, or
+    the noise is assumed;
     `effect_missing`: what is named beats its rivals, what varies with time too, and takes a large share of the misfit
     away; else `unexplained`."""
     if (tolerance.stated or evidence.assumed) and tolerance.admits(evidence.before):
@@ -57,7 +59,9 @@ def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
     if _explains(evidence) and still and not evidence.varying and (within or _beats_its_rivals(evidence)):
         return Verdict(EFFECT_MISSING, within)
     nothing_to_add = not (evidence.added or evidence.white) and _stands_still(evidence)
-    little = tolerance.admits(evidence.before) and (nothing_to_add or evidence.before.is_less_than_noise)
+    doubted = any(one.evidence > THRESHOLDS.gain_beyond_white for one in evidence.ranking)
+    less_than_noise = evidence.before.is_less_than_noise and not doubted
+    little = tolerance.admits(evidence.before) and (nothing_to_add or less_than_noise)
     return Verdict(ADEQUATE, True) if little else Verdict(UNEXPLAINED, False)
 
 
@@ -80,9 +84,11 @@ def _leaves_next_to_nothing(evidence: Evidence, within: bool) -> bool:
 
 
 def _explains(evidence: Evidence) -> bool:
-    """In the sensors' noise the evidence of what leaves more than that knows no doubt: it has to be weighed first."""
+    """In the sensors' noise the evidence of what leaves more than that knows no doubt: it has to be weighed first. And
+    two laws of one element that leave more are the first terms of another one."""
     return (
         0 < evidence.added <= THRESHOLDS.most_at_once
+        and not evidence.one_law
         and (evidence.weighed or evidence.white)
         and evidence.certain
         and evidence.after.share_explained(evidence.before) > evidence.needed

@@ -19,10 +19,11 @@ from ..output_error.gauss_newton import fit
 from ..output_error.problem import make_problem
 from ..parameterization.layout import FARTHEST
 from ..parameterization.magnitudes import measure_magnitudes
+from ..parameterization.model_terms import additions_of
 from ..residuals.residuals import Residuals, analyse
 from .acceptance import cost_of_noise, share_removed
 from .assumptions import as_given, select
-from .fitted_model import Model
+from .fitted_model import Model, fit_model
 from .forward_selection import first_step
 from .search_limit import half_of_what_is_left, search_is_over
 from .selection_path import SelectionPath, first_believed
@@ -51,6 +52,15 @@ def select_from_the_onset(
     Raises ModelError or RecordingError where the data or the model is at fault.
     """
     return _Search(structure, recordings, effects).begun()
+
+
+def model_as_stated(
+    structure: Structure, recordings: Sequence[Recording], effects: Mapping[str, Effect], hopeless: float = np.inf
+) -> Model:
+    """The structure as given, fitted once, from the stated time zeros on; hopeless: as of `fit_model`."""
+    records = _Search(structure, recordings, effects).as_stated
+    magnitudes = measure_magnitudes(structure, records)
+    return fit_model(magnitudes, records, additions_of(magnitudes, effects), hopeless=hopeless)
 
 
 @dataclass(frozen=True)

@@ -48,8 +48,10 @@ class BodyInertia(Effect):
         return ROUGHLY * self._mass(magnitudes.structure, addition)
 
     def limits(self, magnitudes, addition):
-        """A body that would be lighter by more than effects make up is another body, or none."""
-        return -ROUGHLY * self._mass(magnitudes.structure, addition), self.high
+        """A body that would be lighter by more than effects make up is another body, or none; and one more than twice
+        as heavy is stated in another unit."""
+        mass = self._mass(magnitudes.structure, addition)
+        return -ROUGHLY * mass, mass
 
     def log_prior_odds_against(self, structure, c):
         free = [body for body in structure.bodies if body.free]

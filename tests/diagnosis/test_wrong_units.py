@@ -1,0 +1,115 @@
+"""A channel whose sign or unit is wrong, by a simulation of its own: one error names it, and no effect is told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+from scipy.integrate import solve_ivp
+
+from crash_estimator.core.diagnosis import diagnose
+from crash_estimator.core.diagnosis.selection.wrong_units import _is_too_fast
+from crash_estimator.core.effects import EFFECTS
+from crash_estimator.model_file import ModelFile
+from crash_replay.recording import Channel, Recording, RecordingError, Test
+
+MASSES = np.array([1000.0, 300.0])  # kg, of a cab and an engine
+SPEED, RATE, BEFORE, AFTER = 12.0, 5_000, 0.03, 0.1  # m/s, Hz, s, s
+NOISE = 10.0  # m/s^2, 1 g
+MODEL = ModelFile.model_validate(
+    yaml.safe_load(f"""
+name: car
+bodies:
+  cab: {{mass: {MASSES[0]}, acceleration: cab_ax}}
+  engine: {{mass: {MASSES[1]}, acceleration: engine_ax}}
+  barrier: {{fixed: true, force: barrier_fx}}
+elements:
+  front:
+    between: [cab, barrier]
+    stiffness: {{estimate: true, initial: 300000.0, min: 0.0}}
+    tension: none
+  mounts:
+    between: [cab, engine]
+    stiffness: {{estimate: true, initial: 900000.0, min: 0.0}}
+    tension: both
+""")
+).structure()
+FEW = {name: EFFECTS[name] for name in ("coulomb_friction", "added_mass")}
+
+
+def crash(friction: float = 0.0) -> Recording:
+    """friction: N, in the front while it is crushed."""
+
+    def front(crush, rate):
+        return np.where(crush > 0.0, 4e5 * crush + 3e5 * crush**2 + friction * np.tanh(rate / 0.2), 0.0)
+
+    def moves(_, state):
+        x, v = state[:2], state[2:]
+        mounts = 1.2e6 * (x[0] - x[1])
+        return [*v, (-front(x[0], v[0]) - mounts) / MASSES[0], mounts / MASSES[1]]
+
+    way = solve_ivp(moves, (0.0, AFTER), (0.0, 0.0, SPEED, SPEED), max_step=2e-4, rtol=1e-8, dense_output=True)
+    time = np.arange(round(-BEFORE * RATE), round(AFTER * RATE)) / RATE
+    state = way.sol(np.maximum(time, 0.0))
+    moving = time > 0.0
+    accelerations = np.array([moves(0.0, one)[2:] for one in state.T]) * moving[:, None]
+    values = np.column_stack([accelerations, np.where(moving, front(state[0], state[2]), 0.0)])
+    values += np.random.default_rng(3).standard_normal(values.shape) * NOISE * np.array([1.0, 1.0, MASSES.sum()])
+    channels = (
+        Channel("cab_ax", "acceleration", "cab", "x"),
+        Channel("engine_ax", "acceleration", "engine", "x"),
+        Channel("barrier_fx", "force", "barrier", "x"),
+    )
+    test = Test("car", channels, initial_velocity={"cab": SPEED, "engine": SPEED})
+    return Recording(test, np.round(time * 1e9).astype(np.int64), values)
+
+
+def times(recording: Recording, channel: str, factor: float) -> Recording:
+    values = recording.values.copy()
+    values[:, recording.test.index(channel)] *= factor
+    return replace(recording, values=values)
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "said"),
+    [
+        ("cab_ax", -1.0, "reversed"),
+        ("engine_ax", 9.80665, "9.807 times too large"),
+        ("cab_ax", 1.0 / 9.80665, "9.807 times too small"),
+        ("barrier_fx", -1.0, "reversed"),
+        ("cab_ax", 0.001, "1000 times too small"),
+        ("barrier_fx", 0.001, "1000 times too small"),
+        ("barrier_fx", 9.80665, "9.807 times too large"),
+    ],
+)
+def test_a_channel_with_a_wrong_sign_or_unit_is_named_instead_of_an_effect(channel, factor, said):
+    with pytest.raises(RecordingError, match=f"^test car: channel {channel} is {said}, it seems: .*import it again$"):
+        diagnose(MODEL, [times(crash(), channel, factor)], FEW)
+
+
+def test_a_velocity_against_the_channels_is_named():
+    recording = crash()
+    velocity = {body: -speed for body, speed in recording.test.initial_velocity.items()}
+    with pytest.raises(RecordingError, match="^test car: the initial velocity is reversed, it seems"):
+        diagnose(MODEL, [replace(recording, test=replace(recording.test, initial_velocity=velocity))], FEW)
+
+
+def test_of_two_recordings_the_wrong_one_is_named():
+    wrong = times(crash(), "cab_ax", -1.0)
+    wrong = replace(wrong, test=replace(wrong.test, id="second"))
+    with pytest.raises(RecordingError, match="^test second: channel cab_ax is reversed"):
+        diagnose(MODEL, [crash(), wrong], FEW)
+
+
+def test_an_effect_that_makes_up_most_of_a_force_is_named_all_the_same():
+    """Half of what the front carries; of a car that hardly slows down any force would be a curve over its crush."""
+    found = diagnose(MODEL, [crash(friction=1e5)], FEW)
+    assert (found.verdict, found.steps[0].name) == ("effect_missing", "coulomb_friction on front"), found.text
+
+
+@pytest.mark.parametrize(("factor", "too_fast"), [(1.0, False), (2.0, False), (9.8, True)])
+def test_a_body_is_too_fast_that_is_thrown_back_at_more_than_it_came_with(factor, too_fast):
+    recording = crash()
+    assert _is_too_fast(MODEL, times(recording, "cab_ax", factor), "cab_ax") == too_fast
+    alone = replace(recording, test=replace(recording.test, initial_velocity={}))
+    assert _is_too_fast(MODEL, times(alone, "cab_ax", factor), "cab_ax") == too_fast  # than the engine
