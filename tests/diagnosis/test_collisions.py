@@ -144,6 +144,16 @@ def test_damping_that_grows_with_the_depth_of_the_contact_is_told_as_such(expone
     assert abs(step.coefficient / at_100_mm - 1.0) < 0.05 and abs(step.shape["exponent"] - exponent) < 0.03
 
 
+@pytest.mark.parametrize(("power", "at_1_mps"), [(0.6, 600.0), (1.5, 120.0)])
+def test_damping_that_grows_with_a_power_of_the_rate_is_told_as_such(power, at_1_mps):
+    """It was told as dry friction below 1, as quadratic damping above, and was no noise."""
+    found = told(model(), lambda x, v: STIFFNESS * x + at_1_mps * np.sign(v) * np.abs(v) ** power)
+    (step,) = found.steps
+    assert (found.verdict, found.complete) == ("effect_missing", True), found.text
+    assert (step.effect, step.target, step.form) == ("viscous_damping", "bumper", "power"), found.text
+    assert abs(step.coefficient / at_1_mps - 1.0) < 0.05 and abs(step.shape["power"] - power) < 0.05
+
+
 @pytest.mark.parametrize("share", [0.8, 1.5])
 def test_a_stated_stiffness_that_is_wrong_is_told_as_such(share):
     """It was told as a stop that is reached at once beside a false time zero, or as a yielding of what is not there."""

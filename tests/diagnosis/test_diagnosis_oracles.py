@@ -90,6 +90,7 @@ EVERY_EFFECT = (
     EffectSpec("viscous_damping", "foam", 200.0),
     EffectSpec("viscous_damping", "foam", 200.0, {"rebound": 0.3}, variant="uneven"),
     EffectSpec("viscous_damping", "foam", 200.0, {"exponent": 1.5}, variant="hunt_crossley"),
+    EffectSpec("viscous_damping", "foam", 200.0, {"power": 0.6}, variant="power"),
     EffectSpec("quadratic_damping", "foam", 60.0),
     EffectSpec("quadratic_damping", "foam", 60.0, {"rebound": 0.3}, variant="uneven"),
     EffectSpec("coulomb_friction", "mount", 400.0, {"speed": 0.3}),

@@ -141,7 +141,7 @@ def test_none_is_tried_where_nothing_is_missing():
 def test_of_an_effect_in_several_forms_those_that_are_not_looked_for_first_are_rare():
     damper, gas, gap = (EFFECTS[name] for name in ("viscous_damping", "gas_cushion", "clearance"))
     rest = damper.without(damper.common())
-    assert (rest.variants, rest.rare) == (("uneven", "hunt_crossley"), True) and is_rare(
+    assert (rest.variants, rest.rare) == (("uneven", "hunt_crossley", "power"), True) and is_rare(
         Addition(rest, "mount", variant="uneven")
     )
     assert gas.without(gas.common()) is gas and gap.without(gap.common()) is None

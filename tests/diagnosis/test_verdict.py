@@ -70,8 +70,6 @@ LITTLE, DROWNED = left(0.009, 1.0), left(0.009, 0.13)
         ({"weighed": False}, DEFAULT, "unexplained", False),
         ({"certain": False}, DEFAULT, "unexplained", False),
         ({"added": 2}, DEFAULT, "effect_missing", False),
-        ({"added": 2, "one_law": True}, DEFAULT, "unexplained", False),  # the first terms of another law
-        ({"added": 2, "one_law": True, "white": True, "drift": NOTHING_VARIES}, DEFAULT, "effect_missing", True),
         ({"added": 3}, DEFAULT, "unexplained", False),
         ({"ranking": (LEADER, ranked("clearance", "engine", 45.0))}, DEFAULT, "unexplained", False),
         ({"ranking": (LEADER, ranked("clearance", "engine", 45.0, fitted=False))}, DEFAULT, "effect_missing", False),

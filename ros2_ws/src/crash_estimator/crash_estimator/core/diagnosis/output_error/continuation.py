@@ -2,6 +2,10 @@
 
 At first an observer draws the simulation towards the measured motion, the noise is taken larger than it is, and contact
 opens and closes over several steps of time; all of these fade out.
+
+Of each schedule the observers, the factors on the noise and the ramps were halved and doubled: none of 34 looked-at
+cases was told otherwise. They took 1.00 to 1.15 times the iterations with another `FROM_MEASURED_MOTION`, 1.00 to 1.13
+with another `FROM_SIMULATION`, 1.00 with other `SMALL_STEPS` and 0.98 to 1.00 with another `SLOW_CONTACT`.
 """
 
 from typing import NamedTuple
@@ -31,8 +35,8 @@ FROM_MEASURED_MOTION: Schedule = (
 )  # fmt: skip
 """Of a fit that starts from the measured motion. The first observer holds a body within a quarter period of the fastest
 crash (5 ms). A force that jumps at separation is felt by the fit only while it jumps: ramped, it is drawn to the right
-instant. With 63 and 20 in place of 80 and 30, 173 of 181 looked-at cases were told right, 172 with these; but of NHTSA
-10146, filtered, the engine was not named, which hangs on such roundings."""
+instant. Of NHTSA 10146, filtered, the engine was not named with 63 and 20 in place of 80 and 30: it hangs on such
+roundings."""
 
 SMALL_STEPS: Schedule = (
     *(

@@ -17,10 +17,10 @@ from .problem import OutputErrorProblem, Point
 
 STEP = 0.5
 """Of the constant's logarithm, in the coarse look, and what `closer` searches on either side of its best: the point of
-a V is within a step of the least value beside it. Not varied."""
+a V is within a step of the least value beside it. Halved and doubled it changed nothing of 34 looked-at cases."""
 
 PRECISION = 1e-3
-"""Of the logarithm: a thousandth of the slope; not varied."""
+"""Of the logarithm: a thousandth of the slope. Halved and doubled it changed nothing of those cases."""
 
 
 class Profile(NamedTuple):

@@ -40,7 +40,7 @@ that a channel has to pass to be rated: halved and doubled it changed nothing of
 
 START_ERRS = 0.3
 """Of the velocity's standard deviation: wide, since a derivative at the end of a channel has half of the samples to go
-by, and the recording itself says soon enough how the body started. Not varied: any width beyond the error does."""
+by, and the recording itself says soon enough how the body started. Halved it changed nothing of 34 looked-at cases."""
 
 
 FARTHEST = 2.0 * AS_WELL**0.5

@@ -239,7 +239,6 @@ def _evidence(path: SelectionPath, told: _Told, structure: Structure) -> Evidenc
     before, after = left_by(told.given, told.band), left_by(told.final, told.band)
     from_there_on = told.models[len(told.moved) :]
     inflated = told.final.fit.problem.noise_is_inflated
-    laws = [structure.place_of(one.target) for one in path.added if one.effect.acts_on in ("element", "between")]
     return Evidence(
         added=len(path.added) or len(told.steps),  # a time zero is none of the effects that may be too many
         white=told.final.white,
@@ -249,7 +248,6 @@ def _evidence(path: SelectionPath, told: _Told, structure: Structure) -> Evidenc
         ranking=told.ranking,
         weighed=inflated or after.share_explained(before) > THRESHOLDS.nearly_all,
         certain=_certain(path.added, told),
-        one_law=len(set(laws)) < len(laws),
         by_first=_explained_by_first_effect(from_there_on, path.added, told.band),
         needed=needed_share(path.added),
         place_of=structure.place_of,

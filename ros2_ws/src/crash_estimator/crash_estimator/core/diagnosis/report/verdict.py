@@ -29,7 +29,6 @@ class Evidence(NamedTuple):
     place_of: Callable[[str], Hashable] = str  # what two targets have in common that are the same place
     assumed: bool = False  # the noise is, of some channel: to be less than it says little
     varying: Varying | None = None  # with time, and as likely as what was found
-    one_law: bool = False  # two effects are laws of one element
 
     @property
     def noise(self) -> bool:
@@ -84,11 +83,9 @@ def _leaves_next_to_nothing(evidence: Evidence, within: bool) -> bool:
 
 
 def _explains(evidence: Evidence) -> bool:
-    """In the sensors' noise the evidence of what leaves more than that knows no doubt: it has to be weighed first. And
-    two laws of one element that leave more are the first terms of another one."""
+    """In the sensors' noise the evidence of what leaves more than that knows no doubt: it has to be weighed first."""
     return (
         0 < evidence.added <= THRESHOLDS.most_at_once
-        and not evidence.one_law
         and (evidence.weighed or evidence.white)
         and evidence.certain
         and evidence.after.share_explained(evidence.before) > evidence.needed
