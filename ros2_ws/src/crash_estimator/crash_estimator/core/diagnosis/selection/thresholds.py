@@ -45,8 +45,7 @@ class Thresholds(NamedTuple):
     impactor's damper, which a Maxwell element would else have taken the place of, came below this too. And times the
     cost of noise from which a model in doubt of masses and zeros is not fitted on: it leaves more than noise. And from
     which on evidence no longer tells what was found from what varies with time: of NHTSA 10146 with another last digit
-    a mass that does left 0.57 of what the engine leaves. And times what one mended sign or unit leaves: another that
-    leaves more is not named beside it."""
+    a mass that does left 0.57 of what the engine leaves."""
     real_structure: float = 100.0
     """Mean square from which on no second effect is looked for at once, and none beyond those that are believed
     together: of a real structure none takes that. Below it what explains less than `most` is fitted on, but not

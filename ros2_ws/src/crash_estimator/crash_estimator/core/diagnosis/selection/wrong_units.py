@@ -41,14 +41,14 @@ def refuse_wrong_units(
     as_stated, hopeless = max(_left(model)), (1.0 - THRESHOLDS.nearly_all) * model.fit.cost
     others = _otherwise(structure, recording)
     left_by = {what: max(_left(_model(structure, other, effects, hopeless))) for what, other in others}
-    least = min(left_by.values())
-    if least > (1.0 - THRESHOLDS.nearly_all) * min(as_stated, 1.0):
-        return
-    likely = sorted((what for what, left in left_by.items() if left < THRESHOLDS.near_floor * least), key=left_by.get)
-    raise RecordingError(
-        f"test {recording.test.id}: {' or '.join(likely)}, it seems: of the worst channel's mean square the model "
-        f"leaves {as_stated:.0%} as stated and {least:.1%} so; mend the test's description and import it again"
-    )
+    enough = (1.0 - THRESHOLDS.nearly_all) * min(as_stated, 1.0)
+    likely = sorted((what for what, left in left_by.items() if left < enough), key=left_by.__getitem__)
+    if likely:
+        raise RecordingError(
+            f"test {recording.test.id}: {' or '.join(likely)}, it seems: of the worst channel's mean square the model "
+            f"leaves {as_stated:.0%} as stated and {left_by[likely[0]]:.1%} so; mend the test's description and import "
+            "it again"
+        )
 
 
 def _otherwise(structure: Structure, recording: Recording) -> Iterator[tuple[str, Recording]]:
