@@ -83,7 +83,8 @@ def times(recording: Recording, channel: str, factor: float) -> Recording:
     ],
 )
 def test_a_channel_with_a_wrong_sign_or_unit_is_named_instead_of_an_effect(channel, factor, said):
-    with pytest.raises(RecordingError, match=f"^test car: channel {channel} is {said}( or .*)?, it seems: .*import it again$"):
+    expected = f"^test car: channel {channel} is {said}( or .*)?, it seems: .*import it again$"
+    with pytest.raises(RecordingError, match=expected):
         diagnose(MODEL, [times(crash(), channel, factor)], FEW)
 
 
