@@ -1,5 +1,6 @@
 """Whether a diagnosis warns that the model itself may be wrong: of models that were made wrong, not of right ones."""
 
+import re
 import sys
 from dataclasses import replace
 from functools import cache
@@ -33,23 +34,34 @@ def test_a_right_model_is_not_doubted_whether_or_not_an_effect_is_missing(bag, m
     assert doubt(found(bag, model)) == ""
 
 
-def test_a_model_that_explains_little_and_is_not_mended_is_doubted_below_the_verdict(monkeypatch, capsys, tmp_path):
-    """A tenth of the mass: the force calls for ten times the acceleration, and no candidate is so large.
-
-    Fitted to both alike, several motions leave as much to the fourth digit: which is found hangs on where a fit begins.
-    """
+def said_of_a_share_of_the_mass(share: float, monkeypatch, folder) -> int:
+    """What the command ends with, of the bag's car."""
     model = yaml.safe_load(Path(model_path("frontal_single")).read_text())
-    model["bodies"]["car"]["mass"] *= 0.1
-    wrong = tmp_path / "wrong.yaml"
+    model["bodies"]["car"]["mass"] *= share
+    wrong = folder / "wrong.yaml"
     wrong.write_text(yaml.safe_dump(model))
     monkeypatch.setattr(sys, "argv", ["diagnose", str(BAGS / "frontal_single.mcap"), "--model", str(wrong)])
     with pytest.raises(SystemExit) as status:
         command.main()
+    return status.value.code
+
+
+def test_a_model_that_explains_little_and_is_not_mended_is_doubted_below_the_verdict(monkeypatch, capsys, tmp_path):
+    """A fifth of the mass: the force calls for five times the acceleration, and no candidate is so large."""
+    status = said_of_a_share_of_the_mass(0.2, monkeypatch, tmp_path)
     said = capsys.readouterr().out.splitlines()
-    assert status.value.code == 0 and said[0].startswith("unexplained")
-    text = "the model itself or the recording may be wrong (as given it explains {}): " + ADVICE + " (car 13.3 m/s)"
-    motions = ("31% of barrier_fx", "29% of car_ax", "27% of car_ax")
-    assert said[1] in {text.format(why) for why in motions} and said[2] == ""
+    assert status == 0 and said[0].startswith("unexplained")
+    doubted, share = "the model itself or the recording may be wrong (as given it explains ", "[1-4][0-9]% of car_ax"
+    assert (
+        re.fullmatch(re.escape(doubted) + share + re.escape(f"): {ADVICE} (car 13.3 m/s)"), said[1]) and said[2] == ""
+    )
+
+
+def test_of_a_mass_that_looks_like_a_unit_it_is_said_that_it_may_be_the_mass(monkeypatch, capsys, tmp_path):
+    """A tenth of it: the force calls for about 9.81 times the acceleration."""
+    status, said = said_of_a_share_of_the_mass(0.1, monkeypatch, tmp_path), capsys.readouterr()
+    assert status == 1 and not said.out
+    assert "barrier_fx is 9.807 times too large" in said.err and "or the model's masses" in said.err
 
 
 def test_an_element_that_is_written_the_wrong_way_round_is_named(monkeypatch, capsys, tmp_path):

@@ -36,7 +36,7 @@ EFFECT = ElementForce(
     {
         "rebound": Shape("", 1e-3, 5.0, (0.1,)),
         "exponent": Shape("", 0.2, 2.0, (1.0,)),
-        "power": Shape("", 0.4, 1.8, (0.6, 1.4)),
+        "power": Shape("", 0.4, 1.8, (0.7,)),
     },
     force=force,
     doubles="damping",

@@ -82,10 +82,17 @@ def needed_gain(white: bool, found: int) -> float:
 def needed_share(added: Sequence[Addition]) -> float:
     """Of the misfit, that effects must explain to be believed where they leave more than noise: a function of the crush
     follows most of a fold or a break, which no vocabulary has, and one with two shape constants that comes first most
-    else. Two laws of one element are the first terms of another one: no share is enough."""
-    laws = [one.target for one in added if one.effect.acts_on == "element"]
-    if len(set(laws)) < len(laws):
+    else. Two laws of one element may be the first terms of another one, and two functions of its crush are a curve
+    that follows anything: no share is enough."""
+    laws = [one for one in added if one.effect.acts_on == "element"]
+    curves = [one for one in laws if one.effect.of_crush_only]
+    if _share_a_target(curves):
         return 1.0
-    curves = any(one.effect.of_crush_only for one in added)
+    if _share_a_target(laws):
+        return THRESHOLDS.practically_all
     two_shapes = any(len(one.effect.shapes_of(one.variant)) > 1 for one in added[:1])
     return THRESHOLDS.nearly_all if curves or two_shapes else THRESHOLDS.most
+
+
+def _share_a_target(additions: Sequence[Addition]) -> bool:
+    return len({one.target for one in additions}) < len(additions)

@@ -1,4 +1,4 @@
-"""A channel with the wrong sign or in another unit than stated, or reversed velocities: no effect of a structure.
+"""A channel with the wrong sign or in another unit than stated: no effect of a structure.
 
 Then the model leaves a large part of some channel, and next to nothing of that once the right values are taken.
 """
@@ -35,7 +35,8 @@ def refuse_wrong_units(
     """
     left = _left(given)
     recording = recordings[int(np.argmax(left))]
-    if max(left) < THRESHOLDS.some:
+    untouched = any(all(link.apart.all() for link in links) for links in zip(*given.residuals.links, strict=True))
+    if max(left) < THRESHOLDS.some or untouched:  # it is as likely the structure that is the wrong way round
         return
     model = _model(structure, recording, effects)
     as_stated, hopeless = max(_left(model)), (1.0 - THRESHOLDS.nearly_all) * model.fit.cost
@@ -47,21 +48,18 @@ def refuse_wrong_units(
         raise RecordingError(
             f"test {recording.test.id}: {' or '.join(likely)}, it seems: of the worst channel's mean square the model "
             f"leaves {as_stated:.0%} as stated and {left_by[likely[0]]:.1%} so; mend the test's description and import "
-            "it again"
+            "it again, or the model's masses"
         )
 
 
 def _otherwise(structure: Structure, recording: Recording) -> Iterator[tuple[str, Recording]]:
     """The recording with one thing mended."""
-    test = recording.test
     for name, quantity in dict.fromkeys((name, quantity) for _, name, quantity in structure.channels()):
         yield f"channel {name} is reversed", _times(recording, name, -1.0)
         for factor in TAKEN_FOR[quantity]:
             yield f"channel {name} is {factor:.4g} times too small", _times(recording, name, factor)
             if quantity != "acceleration" or _is_too_fast(structure, recording, name):
                 yield f"channel {name} is {factor:.4g} times too large", _times(recording, name, 1.0 / factor)
-    backwards = {body: -velocity for body, velocity in test.initial_velocity.items()}
-    yield "the initial velocity is reversed", replace(recording, test=replace(test, initial_velocity=backwards))
 
 
 def _times(recording: Recording, name: str, factor: float) -> Recording:
