@@ -1,6 +1,5 @@
 """Whether a diagnosis warns that the model itself may be wrong: of models that were made wrong, not of right ones."""
 
-import re
 import sys
 from dataclasses import replace
 from functools import cache
@@ -51,10 +50,12 @@ def test_a_model_that_explains_little_and_is_not_mended_is_doubted_below_the_ver
     status = said_of_a_share_of_the_mass(0.2, monkeypatch, tmp_path)
     said = capsys.readouterr().out.splitlines()
     assert status == 0 and said[0].startswith("unexplained")
-    doubted, share = "the model itself or the recording may be wrong (as given it explains ", "[1-4][0-9]% of car_ax"
-    assert (
-        re.fullmatch(re.escape(doubted) + share + re.escape(f"): {ADVICE} (car 13.3 m/s)"), said[1]) and said[2] == ""
+    text = (
+        "the model itself or the recording may be wrong (as given it explains {}% of car_ax): "
+        + ADVICE
+        + " (car 13.3 m/s)"
     )
+    assert said[1] in {text.format(share) for share in (34, 35, 36)} and said[2] == ""
 
 
 def test_of_a_mass_that_looks_like_a_unit_it_is_said_that_it_may_be_the_mass(monkeypatch, capsys, tmp_path):

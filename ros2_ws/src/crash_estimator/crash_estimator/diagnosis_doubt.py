@@ -31,7 +31,7 @@ def doubt(found: Diagnosis) -> str:
     channel, share = worst_explained(found.models[0])
     if share < LITTLE and found.verdict == "unexplained":
         reasons.append(f"as given it explains {max(share, 0.0):.0%} of {channel}")
-    reasons += [never_touches(name) for name in untouched(found.models[0])]
+    reasons += [never_touches(name) for name in found.models[0].untouched]
     if len(found.steps) >= STACK:
         reasons.append(f"it takes {len(found.steps)} effects to mend it")
     reasons += [f"{name} is as large as it may be, {limit}" for name, limit in at_limit(found)]
@@ -45,12 +45,6 @@ def starts(found: Diagnosis) -> str:
     """How fast the free bodies start in the first recording: one forgotten, or the wrong way, is easily seen."""
     given = found.models[0].records[0].test.initial_velocity
     return ", ".join(f"{b.name} {given.get(b.name, 0.0):.4g}" for b in found.structure.bodies if b.free) + " m/s"
-
-
-def untouched(model: Model) -> list[str]:
-    """Elements that are apart in all recordings."""
-    of_each = zip(model.fit.layout.structure.elements, *model.residuals.links)
-    return [element.name for element, *links in of_each if all(link.apart.all() for link in links)]
 
 
 def worst_explained(model: Model) -> tuple[str, float]:

@@ -54,6 +54,12 @@ class Model(NamedTuple):
         """It leaves nothing but noise."""
         return self.residuals.white
 
+    @property
+    def untouched(self) -> list[str]:
+        """Elements that are apart in all recordings."""
+        of_each = zip(self.fit.layout.structure.elements, *self.residuals.links)
+        return [element.name for element, *links in of_each if all(link.apart.all() for link in links)]
+
     def refitted(self, start: Point | None = None, schedule: Schedule = (), hopeless: float = np.inf) -> "Model":
         """The same model fitted another way."""
         found = fit(self.fit.problem, start, schedule, hopeless)

@@ -35,8 +35,7 @@ def refuse_wrong_units(
     """
     left = _left(given)
     recording = recordings[int(np.argmax(left))]
-    untouched = any(all(link.apart.all() for link in links) for links in zip(*given.residuals.links, strict=True))
-    if max(left) < THRESHOLDS.some or untouched:  # it is as likely the structure that is the wrong way round
+    if max(left) < THRESHOLDS.some or given.untouched:  # it is as likely the structure that is the wrong way round
         return
     model = _model(structure, recording, effects)
     as_stated, hopeless = max(_left(model)), (1.0 - THRESHOLDS.nearly_all) * model.fit.cost
@@ -71,10 +70,9 @@ def _times(recording: Recording, name: str, factor: float) -> Recording:
 def _is_too_fast(structure: Structure, recording: Recording, name: str) -> bool:
     """Whether a channel changes its body's speed by more than the others and the stated ones let it. A motion that is
     made slower on less evidence may never come back: then any course of a force is a curve over its crush."""
-    time = recording.time_ns * 1e-9
-    ours = [name for _, name, quantity in structure.channels() if quantity == "acceleration"]
+    ours = [one for _, one, quantity in structure.channels() if quantity == "acceleration"]
     values = np.nan_to_num(recording.values[:, [recording.test.index(one) for one in ours]])
-    change = np.abs(np.cumsum(values[1:] * np.diff(time)[:, None], axis=0)).max(axis=0)
+    change = np.abs(np.cumsum(values[1:] * np.diff(recording.time)[:, None], axis=0)).max(axis=0)
     speeds = [abs(velocity) for velocity in recording.test.initial_velocity.values()]
     speeds += [speed for one, speed in zip(ours, change, strict=True) if one != name]
     return change[ours.index(name)] > FASTER * max(speeds, default=np.inf)
