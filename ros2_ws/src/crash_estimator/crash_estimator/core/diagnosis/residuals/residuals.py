@@ -19,7 +19,8 @@ from .band_test import Absorbed, BandTest, band_test, band_test_of_fit
 
 UNBOUNDED = 1e3
 """Times the largest value measured, as which a prediction counts that is beyond, or no number: whatever is asked of it,
-a motion without bounds is far off. Not varied: no bounded one leaves a hundredth of that."""
+a motion without bounds is far off. No bounded one leaves a hundredth of that; halved and
+doubled it changed nothing of 34 looked-at cases."""
 
 
 class Residuals(NamedTuple):

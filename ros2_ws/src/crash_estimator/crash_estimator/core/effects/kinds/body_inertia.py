@@ -16,8 +16,8 @@ hardly known to a percent. Ours, not varied: tests with masses off by 1 to 2 % w
 
 LEFT_OUT = 3.0
 """Nats, ln 20, that a lighter body must gain over a heavier one: of two bodies whose forces nothing measures only the
-ratio of the masses shows, and what was left out of a model is far commoner than what was counted twice. Ours, not
-varied."""
+ratio of the masses shows, and what was left out of a model is far commoner than what was counted twice. Halved
+and doubled it changed nothing of 34 looked-at cases."""
 
 
 @dataclass(frozen=True)
