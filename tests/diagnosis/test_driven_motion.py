@@ -71,7 +71,8 @@ def test_an_attached_body_pushes_without_its_ringing_where_noise_stands_for_that
     a = np.column_stack([np.zeros_like(LEFT), LEFT + 50.0 * np.sin(2.0 * np.pi * 900.0 * TIME)])
     signals = {"car": SimpleNamespace(on_grid=a[:, 1])}
     record = SimpleNamespace(dt=np.full(len(TIME), step), noise_is_inflated=inflated, signals=signals)
-    inertia = measured_inertia(SimpleNamespace(attached={"box": 1}), record, SimpleNamespace(a=a))
+    car = SimpleNamespace(body_index={"cab": 0}, bodies=[SimpleNamespace(acceleration=("car",))])
+    inertia = measured_inertia(SimpleNamespace(attached={"box": 1}, structure=car), record, SimpleNamespace(a=a))
     for channel in ("box", "car"):  # as that of a body of the model, whose mass varies
         assert_allclose(inertia(channel), cfc_filter(a[:, 1], step, 60) if filtered else a[:, 1])
 

@@ -12,13 +12,14 @@ from crash_estimator.core.diagnosis.selection.rare_effects import with_rare_ones
 from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
 from crash_estimator.core.effects import EFFECTS
 
-IN_RARE_FORMS = {"rate_hardening", "viscous_damping", "quadratic_damping", "coulomb_friction"}
+IN_RARE_FORMS = {"rate_hardening", "viscous_damping", "quadratic_damping", "coulomb_friction", "unmodelled_body"}
 RECORD = SimpleNamespace(below=np.inf, bins=1000, measured=np.zeros((1000, 1)))
 
 
 def fitted(name: str, cost: float) -> CandidateFit:
-    addition = SimpleNamespace(key=(name, "spring"), target="spring")
-    return CandidateFit(addition, 1e5 - cost, SimpleNamespace(cost=cost))
+    law = SimpleNamespace(acts_on="body" if name == "hung mass" else "element")
+    addition = SimpleNamespace(key=(name, "spring"), target="spring", effect=law)
+    return CandidateFit(addition, 1e6 - cost, SimpleNamespace(cost=cost))
 
 
 def left(fit) -> SimpleNamespace:
@@ -44,12 +45,13 @@ def test_a_rare_effect_comes_into_the_ranking_where_it_leaves_noise_or_next_to_n
 ):
     tried = []
 
-    def fit_candidates(magnitudes, effects, model, thorough=False, least=np.inf):
+    def begin(magnitudes, effects, model, least):
         assert set(effects) == RARE | IN_RARE_FORMS and least == left_by_common
-        tried.append(thorough)
-        return [fitted("gas_cushion", cost=left_by_rare)]
+        tried.append(False)
+        return SimpleNamespace(ranking=lambda: [fitted("gas_cushion", cost=left_by_rare)])
 
-    monkeypatch.setattr(rare_effects, "fit_candidates", fit_candidates)
+    monkeypatch.setattr(rare_effects, "begin", begin)
+    monkeypatch.setattr(rare_effects, "fit_harder", lambda search, model: tried.append(True))
     for module in (selection_step, rare_effects):
         monkeypatch.setattr(module, "analyse", left)
     fit = SimpleNamespace(cost=1e5)
@@ -76,19 +78,33 @@ def test_a_common_effect_comes_near_a_rare_one_unless_it_leaves_four_times_as_mu
     """In units of the noise: of a damper with a valve a usual one leaves 1.66, and its own form 1.01."""
     for module in (selection_step, rare_effects):
         monkeypatch.setattr(module, "analyse", left)
-    model = SimpleNamespace(records=[RECORD])
+    model = SimpleNamespace(records=[RECORD], residuals=left(SimpleNamespace(cost=1e5)))
     steps = [SelectionStep(model, [fitted("an effect", cost=1e3 * leaves)]) for leaves in (common, rare)]
     assert rare_effects._comes_near(*steps) == near
+
+
+@pytest.mark.parametrize(
+    ("name", "leaves", "believed"), [("hung mass", 5e3, True), ("hung mass", 2e4, False), ("gas_cushion", 5e3, False)]
+)
+def test_practically_nothing_of_a_misfit_far_from_the_noise_is_enough_where_no_two_common_laws_add_up_to_it(
+    monkeypatch, name, leaves, believed
+):
+    """Five times the noise of a thousand times: a cushion may be a damper with friction, a hung mass is no two laws."""
+    for module in (selection_step, rare_effects):
+        monkeypatch.setattr(module, "analyse", left)
+    model = SimpleNamespace(records=[RECORD], residuals=left(SimpleNamespace(cost=1e6)))
+    assert rare_effects._leaves_next_to_nothing(SelectionStep(model, [fitted(name, cost=leaves)])) == believed
 
 
 @pytest.mark.parametrize(("gain", "asked"), [(11.0, False), (30.0, True)])
 def test_where_noise_is_left_as_given_rare_ones_are_asked_only_where_a_common_one_stands_out(monkeypatch, gain, asked):
     tried = []
-    monkeypatch.setattr(rare_effects, "fit_candidates", lambda *given, **least: tried.append(given) or [])
+    nothing = SimpleNamespace(ranking=list)
+    monkeypatch.setattr(rare_effects, "begin", lambda *given: tried.append(given) or nothing)
     for module in (selection_step, rare_effects):
         monkeypatch.setattr(module, "analyse", left)
     model = SimpleNamespace(white=True, fit=SimpleNamespace(cost=1e3), records=[SimpleNamespace(below=np.inf)])
-    step = SelectionStep(model, [fitted("friction", cost=1e5 - gain)])
+    step = SelectionStep(model, [fitted("friction", cost=1e6 - gain)])
     found = with_rare_ones(SimpleNamespace(structure=SimpleNamespace(effects=())), EFFECTS, step)
     assert found.candidates == step.candidates and bool(tried) == asked
 

@@ -71,6 +71,6 @@ def test_what_the_measured_motion_promises_is_fitted_without_stiffnesses_as_they
     model, common = fit_given(magnitudes, records, ()), common_effects(structure, EFFECTS)
     best, *_ = candidate_fits.fit_candidates(magnitudes, common, model, thorough=True)
     assert best.addition.key == ("yielding", "cab_engine")
-    monkeypatch.setattr(candidate_fits._Search, "as_promised", lambda self, by_motion: None)
+    monkeypatch.setattr(candidate_fits._Search, "as_promised", lambda self: None)
     without = candidate_fits.fit_candidates(magnitudes, common, model, thorough=True)
     assert all(one.gain < 0.5 * best.gain for one in without if one.addition.effect.name == "yielding")

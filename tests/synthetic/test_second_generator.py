@@ -80,7 +80,7 @@ def test_another_seed_is_another_case():
 
 def test_what_is_hidden_changes_the_recording_by_more_than_the_noise():
     for n, (name, form) in enumerate(FORMS.items()):
-        if form.effect == "unmodelled_body":  # it changes the model, not the recording
+        if name == "body.engine":  # it changes the model, not the recording
             continue
         quickest = next(one for one in ("wall", "sled", "side", "cab") if one in form.targets)
         case = Case(quickest, name, 1.0, "clean", SEED + 100 + n)
@@ -92,7 +92,7 @@ def test_what_is_hidden_is_not_in_the_model_and_what_is_right_is_written_down():
     it = drawn(case)
     (right,) = it.right
     assert right[0] == "added_mass" and right[1] in ("cab", "engine")
-    assert drawn(Case("side", "outside.sloshing", 1.0, "clean", SEED)).right == ()
+    assert drawn(Case("side", "outside.running", 1.0, "clean", SEED)).right == ()
     assert drawn(Case("cab", "body.engine", 1.0, "clean", SEED)).right == (("unmodelled_body", "engine_ax"),)
 
 

@@ -89,7 +89,7 @@ def _asked(drawn: Sequence[Judged]) -> str:
         [j.row["iterations"] for j in drawn if j.row["verdict"] == word] for word in (EFFECT_MISSING, UNEXPLAINED)
     )
     of_answer = f"{median(answers):.0f}, most {max(answers)}" if answers else "-"
-    times = f"{median(unexplained) / median(answers):.2g}" if answers and unexplained else "-"
+    times = f"{median(unexplained) / median(answers):.3g}" if answers and unexplained else "-"
     rows = [
         ("right effect and target first, 0.5 to 2 g, all forms", "95 %", _share(one, right)),
         *((f"at {noise:g} g", "95 %", _share([j for j in one if j.case.noise == noise], right)) for noise in NOISES),

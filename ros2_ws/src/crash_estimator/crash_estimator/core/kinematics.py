@@ -65,6 +65,7 @@ class KinematicState(NamedTuple):
     crush: np.ndarray  # (e,) of the last sample
     rate: np.ndarray  # (e,)
     zero: np.ndarray  # (e,) m, of a measured crush: where it stands before the impact
+    swings: tuple[tuple[float, float], ...]  # m, m/s of each body that hangs, from where it hangs at rest
 
 
 def initial_motion(structure: Structure, test: Test) -> tuple[np.ndarray, np.ndarray]:
@@ -95,7 +96,9 @@ class Kinematics:
         self.structure = structure
         self.channel_count = len(test.channels)
         self.offsets = np.array([channel.quantity in ("acceleration", "force") for channel in test.channels])
-        self.accelerometers = [(k, [test.index(name) for name in b.acceleration]) for k, b in enumerate(bodies)]
+        self.accelerometers = [
+            (k, [] if b.hangs else [test.index(name) for name in b.acceleration]) for k, b in enumerate(bodies)
+        ]
         self.crush_channels = [(k, test.index(e.displacement)) for k, e in enumerate(elements) if e.displacement]
         self.rate_channels = [(k, test.index(e.velocity)) for k, e in enumerate(elements) if e.velocity]
         self.derived_rates = [k for k, e in enumerate(elements) if e.displacement and not e.velocity]
@@ -107,6 +110,8 @@ class Kinematics:
             (row, test.index(bodies[k].applied), bodies[k].mass)
             for row, k in enumerate(structure.equations) if bodies[k].applied
         ]  # fmt: skip
+        self.hangs = np.array([bool(body.hangs) for body in bodies])
+        self.hanging = [(k, structure.body_index[b.carried_by], *b.hangs) for k, b in enumerate(bodies) if b.hangs]
         self.initial_displacement, self.initial_velocity = initial_motion(structure, test)
         self.origin = np.array([element.origin for element in elements])
         self.play = np.array([element.play for element in elements])
@@ -127,6 +132,7 @@ class Kinematics:
             elements,
             elements,
             elements,
+            tuple((0.0, 0.0) for _ in self.hanging),
         )
 
     def step(self, state: KinematicState, sample: Sample) -> tuple[KinematicState, Motion]:
@@ -147,6 +153,9 @@ class Kinematics:
             dt = (sample.time_ns - max(state.time_ns, 0)) * 1e-9
             now = np.where(np.isnan(acceleration), state.acceleration, acceleration)  # bridges a dropout
             last = now if state.time_ns < 0 else state.acceleration
+            if self.hanging:
+                state = self._swung(state, dt, last, now)
+                acceleration = np.where(self.hangs, now, acceleration)
             displacement = state.displacement + dt * state.velocity + dt * dt * (2.0 * last + now) / 6.0
             velocity = state.velocity + 0.5 * dt * (last + now)
         if before_impact:
@@ -172,7 +181,8 @@ class Kinematics:
         )  # fmt: skip
 
     def _body_accelerations(self, values: np.ndarray) -> np.ndarray:
-        """(b,) mean of each body's valid channels; 0 for a body without channels, NaN where all have dropped out."""
+        """(b,) mean of each body's valid channels, NaN where all have dropped out; 0 for a body without channels, and
+        for one that hangs: it does not move as the channels do that it follows."""
         result = np.zeros(len(self.accelerometers))
         for body, columns in self.accelerometers:
             if len(columns) == 1:
@@ -181,6 +191,18 @@ class Kinematics:
                 valid = [values[c] for c in columns if values[c] == values[c]]
                 result[body] = sum(valid) / len(valid) if valid else np.nan
         return result
+
+    def _swung(self, state: KinematicState, dt: float, last: np.ndarray, now: np.ndarray) -> KinematicState:
+        """With what hangs a step further; its acceleration is put into now (b,)."""
+        from .hung_body import hung  # the compiler takes long to import: only who needs it waits for it
+
+        swings = []
+        for (k, carrier, frequency, damping), start in zip(self.hanging, state.swings, strict=True):
+            at_both_ends = np.array([last[carrier], now[carrier]])
+            found, swing = hung(np.array([0.0, dt]), at_both_ends, start, frequency, damping)
+            now[k] = found[-1]
+            swings.append(swing)
+        return state._replace(swings=tuple(swings))
 
     def _crush(self, state, values, displacement, velocity, dt) -> tuple[np.ndarray, np.ndarray]:
         """(e,) crush and rate: from the bodies' motion, or from measured channels where the model names them."""

@@ -139,8 +139,12 @@ class Colour(NamedTuple):
 
 
 def colour_of(rests: Sequence[np.ndarray], period: float) -> Colour:
-    """Of noises alone, values (n,) each, that are as loud as they like."""
-    rests = [(rest - rest.mean()) / (np.std(rest) or 1.0) for rest in rests]
+    """Of noises alone, values (n,) each, that are as loud as they like; one that shows in no bit of a recorder says
+    nothing."""
+    samples = sum(len(rest) for rest in rests)
+    rests = [(rest - rest.mean()) / np.std(rest) for rest in rests if np.ptp(rest) > 0.0]
+    if not rests:
+        return Colour(np.zeros(0), samples, 0.0)
     n = sum(len(rest) for rest in rests)
     variances, filters = _burg(rests, min(MOST, n // PER_ORDER, min(len(rest) for rest in rests) - 1))
     gained = n * np.log(variances[0] / variances)

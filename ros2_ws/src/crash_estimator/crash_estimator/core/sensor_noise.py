@@ -45,7 +45,9 @@ def sensor_noise(
 ) -> "NoiseSpectrum":
     """Of values (n,). A vibrating structure is noisier in the crash than at rest: then that is the floor a model can
     reach. Rest alone tells whether neighbouring samples are alike; alike: colours that the noise of other rests has;
-    derived: of another channel, which has smoothed it."""
+    derived: of another channel, which has smoothed it.
+
+    It is no less than that of rounding to a recorder's steps q, q / sqrt(12) (Bennett 1948): at rest less may show."""
     # late: a viewer has started before there is any noise
     from .noise_spectrum import SLOWEST_FILTER, NoiseSpectrum, noise_spectrum
 
@@ -71,8 +73,15 @@ def sensor_noise(
         n_rest, n_busy = len(before), EFFICIENCY * len(after)
         pooled = np.sqrt((n_rest * rest**2 + n_busy * busy**2) / (n_rest + n_busy))
         found = NoiseSpectrum(float(pooled), n_rest + n_busy)
-    least = max(SMALLEST * peak, 1e-12)
+    least = max(SMALLEST * peak, _recorder_step(values, SMALLEST * peak) / np.sqrt(12.0), 1e-12)
     return found._replace(std=max(found.std, least), samples=max(found.samples, 2.0))
+
+
+def _recorder_step(values: np.ndarray, rounding: float) -> float:
+    """Least difference of two values, which is the step of a recorder of few bits; what is below `rounding` is none."""
+    apart = np.diff(np.sort(values))
+    steps = apart[apart > rounding]
+    return float(steps.min()) if len(steps) else 0.0
 
 
 def _highest_frequencies(values: np.ndarray) -> float:

@@ -31,6 +31,7 @@ class Body:
     force: str | None = None  # channel of the measured force on a fixed body
     noise: float | None = None  # standard deviation of its equation's error, m/s^2 or N; None: found from the data
     carried_by: str | None = None  # a driven body within another one, which feels what pushes it
+    hangs: tuple[float, float] | None = None  # Hz, damping ratio: it hangs so on what its channels are of
     start: tuple[float, float] = (0.0, 0.0)  # m, m/s at time zero, where the test does not say
     starts_faster: float = 0.0  # share of its initial velocity, by an effect
     applied: str | None = None  # channel of a measured force on a free body, positive in the direction of travel

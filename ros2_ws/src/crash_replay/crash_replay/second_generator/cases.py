@@ -106,7 +106,7 @@ def _attempt(case: Case, rng: Rng) -> Drawn | None:
         if target in setup.joints and base.peak.f < LOADED * _largest(base):
             return None
         hidden = hide(case.form, base)
-        if form.effect != "unmodelled_body":
+        if not hidden.setup.unmodelled:  # that changes the model, not the recording
             seen = _seen(setup, hidden)
             if seen < SEEN:
                 return None

@@ -146,7 +146,8 @@ FORMS: dict[str, Form] = {
     ),
     "hysteresis.line": Form("plastic_unloading", CONTACTS, sizes.changed(sizes.line), ("hysteresis",), elastic=True),
     "mass.rigid": Form("added_mass", BODIES, sizes.heavier),
-    "mass.mounted": Form("added_mass", BODIES, sizes.carried),
+    "mass.mounted": Form("added_mass", BODIES, sizes.carried, ("unmodelled_body",)),
+    "mass.hung": Form("unmodelled_body", BODIES, sizes.hung),
     "path.linear": Form("load_path", PATHS, sizes.path("linear")),
     "path.slack": Form("load_path", PATHS, sizes.path("slack")),
     "path.curved": Form("load_path", PATHS, sizes.path("curved")),
@@ -164,7 +165,7 @@ FORMS: dict[str, Form] = {
     "channel.lowpass": Form("channel_delay", BODIES, sizes.as_it_is),
     "outside.losing": Form("losing_mass", BODIES, sizes.losing, outside=True),
     "outside.folding": Form("folding", CONTACTS, sizes.folding, straight=True, outside=True),
-    "outside.sloshing": Form("sloshing", BODIES, sizes.sloshing, outside=True),
+    "outside.running": Form("running", BODIES, sizes.running, outside=True),
     "outside.breaking": Form("breaking", ELEMENTS, sizes.beside(sizes.breaking), straight=True, outside=True),
     "outside.rattling": Form("rattling", BODIES, sizes.rattling, outside=True),
 }

@@ -165,6 +165,15 @@ def carried(base: Base) -> Setup:
     return joined(base.setup, Body("load", mass, body.v), mount.with_branch(branches.Dashpot(0.2 * mass * w)))
 
 
+def hung(base: Base) -> Setup:
+    """A sixth of the body's mass swings in it at 15 to 30 Hz, and no sensor knows of it: an engine, an occupant."""
+    body = base.setup.body(base.target)
+    loose, w = base.share(0.12, 0.22) * body.mass, base.share(95.0, 190.0)
+    setup = replace(base.setup.with_body(base.target, mass=body.mass - loose), masses={body.name: body.mass})
+    mount = Joint(body.name, "loose", Straight(loose * w * w), one_way=False)
+    return joined(setup, Body("loose", loose, body.v), mount.with_branch(branches.Dashpot(0.2 * loose * w)))
+
+
 def joined(setup: Setup, body: Body, joint: Joint) -> Setup:
     joined = replace(setup, bodies=(*setup.bodies, body), hidden_bodies=(*setup.hidden_bodies, body.name))
     return joined.with_joint("hidden", joint)
@@ -206,6 +215,13 @@ def engine(base: Base) -> Setup:
 # --- outside every vocabulary
 
 
+def running(base: Base) -> Setup:
+    """A motor that runs out of balance pushes its body to and fro, 20 to 45 times in a second."""
+    size = base.share(0.12, 0.25) * base.peaks(base.target, "").f
+    w, phase = 2.0 * np.pi * base.share(20.0, 45.0), base.share(0.0, 2.0 * np.pi)
+    return base.setup.with_body(base.target, push=lambda t, v: size * np.sin(w * t + phase))
+
+
 def losing(base: Base) -> Setup:
     """A quarter of the mass goes while it is crushed."""
     mass, lost = base.setup.body(base.target).mass, base.share(0.2, 0.35)
@@ -242,15 +258,6 @@ def rattling(base: Base) -> Setup:
 def metered(base: Base) -> branches.Branch:
     c = base.share(0.15, 0.3) * base.peak.f / base.peak.v**2
     return branches.MeteringPin(c, base.share(1.3, 1.8) * base.peak.x)
-
-
-def sloshing(base: Base) -> Setup:
-    """A sixth of the body's mass swings in it at 15 to 30 Hz, and no sensor knows of it: a tank, an occupant."""
-    body = base.setup.body(base.target)
-    loose, w = base.share(0.12, 0.22) * body.mass, base.share(95.0, 190.0)
-    setup = replace(base.setup.with_body(base.target, mass=body.mass - loose), masses={body.name: body.mass})
-    hung = Joint(body.name, "loose", Straight(loose * w * w), one_way=False)
-    return joined(setup, Body("loose", loose, body.v), hung.with_branch(branches.Dashpot(0.2 * loose * w)))
 
 
 def guided(base: Base) -> Setup:

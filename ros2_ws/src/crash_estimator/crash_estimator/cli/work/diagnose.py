@@ -68,7 +68,7 @@ def apply(found: Diagnosis, had: tuple[EffectSpec, ...], effects: dict[str, Effe
 
 
 def _entry(spec: EffectSpec, effect: Effect, bodies: list[str]) -> CommentedMap:
-    key = effect.acts_on
+    key = effect.target_key(spec.variant)
     entry = CommentedMap({"type": spec.type, key: spec.target})
     if key == "between":
         pair = next(p for p in permutations(bodies, 2) if "-".join(map(visible, p)) == spec.target)

@@ -86,7 +86,6 @@ class Effect:
     changes_law: ClassVar[bool] = False  # a constant of the spring's law itself, in which the force is not linear
 
     # Its place in the rest of the model
-    attaches_body: ClassVar[bool] = False  # a further body, driven by the channel that is the target
     balances_momentum: ClassVar[bool] = False  # it changes what masses and forces must add up to
     on_ground: ClassVar[bool] = False  # its link's other end
     changes_start: ClassVar[bool] = False  # bodies start faster than the test says
@@ -104,6 +103,14 @@ class Effect:
     def channels(self, structure: Structure, target: str) -> Sequence[str]:
         """Those that it makes wrong, where it makes any."""
         return (target,)
+
+    def target_key(self, variant: str) -> str:
+        """What it acts on in one of its variants, as a model file says it."""
+        return self.acts_on
+
+    def attaches_body(self, variant: str) -> bool:
+        """Whether it brings a further body, driven by the channel that is the target."""
+        return False
 
     @property
     def only_distorts(self) -> bool:
@@ -261,6 +268,10 @@ class Addition:
     @property
     def key(self) -> tuple[str, str]:
         return self.effect.name, self.target
+
+    @property
+    def attaches_body(self) -> bool:
+        return self.effect.attaches_body(self.variant)
 
     def spec(self, coefficient: float | None = None, shape: Mapping[str, float] | None = None) -> EffectSpec:
         """As a model file says it; without a coefficient that and the shape constants are found from the data."""

@@ -33,9 +33,8 @@ def checked(structure: Structure, spec: EffectSpec, effects: Mapping[str, Effect
     what = f"model {structure.name}: effect {spec.type}"
     targets = effect.possible_targets(structure, test)
     if targets is not None and spec.target not in targets:
-        raise ModelError(
-            f"{what} cannot act on {spec.target!r}; it needs {NOUN[effect.acts_on]}: {_choice(spec.target, targets)}"
-        )
+        nouns = " or ".join(dict.fromkeys(NOUN[effect.target_key(variant)] for variant in effect.variants))
+        raise ModelError(f"{what} cannot act on {spec.target!r}; it needs {nouns}: {_choice(spec.target, targets)}")
     if spec.variant not in effect.variants:
         forms = ", ".join(filter(None, effect.variants))
         raise ModelError(f"{what} has no form {spec.variant!r}; " + (f"it has {forms}" if forms else "leave it out"))

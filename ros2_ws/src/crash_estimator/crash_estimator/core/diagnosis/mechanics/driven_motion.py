@@ -121,7 +121,7 @@ def stated_start(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
     v0, x0 = np.zeros((2, len(layout.bodies)))
     own = slice(len(layout.structure.bodies))
     v0[own], x0[own] = record.initial_velocity, record.initial_displacement
-    for addition in (term.addition for term in layout.terms if term.addition.effect.attaches_body):
+    for addition in (term.addition for term in layout.terms if term.addition.attaches_body):
         k = layout.attached[addition.target]
         x0[k], v0[k] = attached_start(layout.structure, record, addition)
     return v0, x0

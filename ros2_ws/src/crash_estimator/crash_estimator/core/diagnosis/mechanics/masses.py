@@ -57,17 +57,22 @@ def body_loads(
 
 
 def measured_inertia(layout: Layout, record: ObservedRecord, trajectory: Trajectory) -> Callable[[str], np.ndarray]:
-    """Acceleration (g,) of what acts as inertia, by its channel: an attached body's, or as it was measured.
+    """Acceleration (g,) of what acts as inertia: an attached body's by its channel, else as that was measured, or as a
+    body's own channels were.
 
     Where noise stands for what is left of a structure that rings, its ringing is none: what counts is the band in
     which such outputs are compared.
     """
-    step = float(record.dt[-1])
+    step, index = float(record.dt[-1]), layout.structure.body_index
     rigid = record.noise_is_inflated and step * SLOWEST <= 1.0
 
-    def inertial(channel: str) -> np.ndarray:
-        body = layout.attached.get(channel)
-        a = record.signals[channel].on_grid if body is None else trajectory.a[:, body]
+    def inertial(name: str) -> np.ndarray:
+        channels = layout.structure.bodies[index[name]].acceleration if name in index else (name,)
+        attached = layout.attached.get(name)
+        if attached is None:
+            a = np.mean([record.signals[one].on_grid for one in channels], axis=0)
+        else:
+            a = trajectory.a[:, attached]
         return cfc_filter(a, step, CFC) if rigid else a
 
     return inertial
@@ -85,6 +90,7 @@ def balance_of(experiment: Experiment, theta: np.ndarray) -> np.ndarray:
             force -= mass[k] * motion.a[:, k]
         if body.applied:
             force += record.signals[body.applied].on_grid
-    for load in body_loads(layout, theta, record, lambda channel: motion.a[:, layout.attached[channel]]):
+    moving = layout.structure.body_index | layout.attached
+    for load in body_loads(layout, theta, record, lambda name: motion.a[:, moving[name]]):
         force += theta[load.term.coefficient] * load.force
     return force

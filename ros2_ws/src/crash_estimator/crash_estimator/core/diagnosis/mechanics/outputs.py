@@ -28,7 +28,7 @@ def output_noise(experiment: Experiment, theta: np.ndarray, samples: int = 1) ->
     """
     layout, record, _ = experiment
     variance, growth = record.noise**2, []
-    terms = [term for term in layout.terms if term.addition.effect.attaches_body]
+    terms = [term for term in layout.terms if term.addition.attaches_body]
     if record.noise_is_inflated or not terms:
         return Noise(record.noise, growth)
     mass, index = masses(layout, theta), layout.structure.body_index

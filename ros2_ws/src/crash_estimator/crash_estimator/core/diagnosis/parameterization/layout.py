@@ -112,11 +112,11 @@ def make_layout(
     for k, element in enumerate(structure.elements):
         wanted = element.stiffness.estimated and element.stiffness.shape == "curve"
         curves.append(_element_curve(b, k, element, magnitudes, roughness) if wanted else None)
-    channels = dict.fromkeys(one.target for one in additions if one.effect.attaches_body)
+    channels = dict.fromkeys(one.target for one in additions if one.attaches_body)
     attached = {channel: len(structure.bodies) + k for k, channel in enumerate(channels)}
     touching = []
     for addition in additions:
-        if addition.effect.attaches_body and addition.touches:
+        if addition.attaches_body and addition.touches:
             at, crush = magnitudes.touching(addition)
             force = magnitudes.host_force(addition)
             name = _touch_name(addition)
@@ -176,7 +176,7 @@ def _bodies(structure: Structure, additions: Sequence[Addition]) -> Iterator[tup
     """The structure's own and their kinds, then attached ones, then the ground where something slides on it."""
     for body in structure.bodies:
         yield body.name, FREE if body.free else DRIVEN if body.driven else FIXED
-    for channel in dict.fromkeys(one.target for one in additions if one.effect.attaches_body):
+    for channel in dict.fromkeys(one.target for one in additions if one.attaches_body):
         yield channel, DRIVEN
     if GROUND not in structure.body_index and any(one.effect.on_ground for one in additions):
         yield GROUND, FIXED

@@ -40,6 +40,6 @@ def _addition(magnitudes: Magnitudes, spec: EffectSpec, effects: Mapping[str, Ef
     if coefficient is not None:
         coefficient = effect.unstated(coefficient, **shapes)
     host = spec.host
-    if effect.attaches_body and host is None:
+    if effect.attaches_body(spec.variant) and host is None:
         host = next(body.name for body in structure.bodies if body.free)
     return Addition(effect, spec.target, shapes, coefficient, host, spec.touches, spec.taken_from, spec.variant)

@@ -12,7 +12,8 @@ from ..output_error.gauss_newton import Fit
 from ..parameterization.layout import Experiment
 from ..parameterization.terms import Term
 from ..residuals.residuals import analyse, noise_floor
-from ..selection.candidate_fits import CandidateFit, odds_against
+from ..selection.acceptance import odds_against
+from ..selection.candidate_fits import CandidateFit
 from ..selection.fitted_model import Model
 from ..selection.selection_step import SelectionStep
 from ..selection.thresholds import THRESHOLDS

@@ -96,3 +96,21 @@ def needed_share(added: Sequence[Addition]) -> float:
 
 def _share_a_target(additions: Sequence[Addition]) -> bool:
     return len({one.target for one in additions}) < len(additions)
+
+
+def odds_against(addition: Addition, fitted: Fit) -> float:
+    """Nats that it must gain over others, as it was fitted."""
+    return addition.effect.log_prior_odds_against(fitted.layout.structure, coefficient(addition, fitted))
+
+
+def coefficient(addition: Addition, fitted: Fit) -> float:
+    return float(fitted.theta[fitted.layout.term(addition).coefficient])
+
+
+def among_variants(addition: Addition, gain: float) -> float:
+    """Among an effect's own variants: an unmodelled body that was counted in with another must gain more.
+
+    Without a measured force nothing tells it from one beside the model's masses: halving every force and mass leaves
+    the motion as it is.
+    """
+    return gain - (THRESHOLDS.gain if addition.taken_from else 0.0)

@@ -13,7 +13,7 @@ from ..output_error.problem import OutputErrorProblem, Point, make_problem
 from ..output_error.profile_likelihood import closer, profile
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
-from .acceptance import cost_of_noise
+from .acceptance import among_variants, coefficient, cost_of_noise, odds_against
 from .candidates import candidates
 from .fitted_model import Model
 from .score_screening import Screened, screen, shortlist
@@ -45,26 +45,39 @@ def fit_candidates(
 
     thorough: fit the best of them harder, where none of the most likely ones leaves white noise. in_other_noise: what
     was found with other noise, best first; its best fits are gone on from. earlier: what was found for the models
-    before this one: beside what was found, only what explains most is fitted harder. least: cost that another
-    explanation leaves; what stays far above it is not fitted to the end.
+    before this one: beside what was found, only what explains most is fitted harder. least: as of `begin`.
     """
+    search = begin(magnitudes, effects, model, least)
+    if thorough:
+        fit_harder(search, model, in_other_noise, earlier)
+    else:
+        search.go_on_from(in_other_noise)
+    return search.ranking()
+
+
+def begin(magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, least: float = np.inf) -> "_Search":
+    """The likeliest candidates fitted; least: cost that another explanation leaves; what stays far above it is not
+    fitted to the end."""
     additions = candidates(magnitudes, effects, model.additions)
     given = magnitudes, model.records, model.additions, additions, model.roughness
     by_fit = screen(*given, model.fit)
-    short = THRESHOLDS.shortlist
-    search = _Search(magnitudes, model, by_fit, least)
     by_motion = [] if model.white else screen(*given)
-    worth = [one for one in by_fit if one.gain > 0.0]
-    search.from_motion(shortlist(by_motion, short))
-    search.from_model(shortlist(worth, short))
-    if thorough:
-        search.as_promised(by_motion)
-    search.go_on_from([one for one in in_other_noise if one.fit][:short])
+    search = _Search(magnitudes, model, by_fit, by_motion, least)
+    search.from_motion(shortlist(by_motion, THRESHOLDS.shortlist))
+    search.from_model(shortlist([one for one in by_fit if one.gain > 0.0], THRESHOLDS.shortlist))
+    return search
+
+
+def fit_harder(
+    search: "_Search", model: Model, in_other_noise: Sequence[CandidateFit] = (), earlier: Sequence[CandidateFit] = ()
+) -> None:
+    """Go on with a search that has begun, as `fit_candidates` says."""
+    search.as_promised()
+    search.go_on_from(in_other_noise)
     nothing_left = model.white and earlier  # to stand for what was added, it would have had to explain all alone
-    if thorough and model.residuals.mean_square < THRESHOLDS.near_floor and not nothing_left:
-        # such an error bends the motion that all curves are fitted to: no linearisation tells what it would gain
-        search.from_motion(Screened(a, 0.0, 0.0, 1.0) for a in additions if _bends_driven_motion(magnitudes, a))
-    if thorough and not model.white:
+    if model.residuals.mean_square < THRESHOLDS.near_floor and not nothing_left:
+        search.from_motion(search.bending())
+    if not model.white:
         ways = search.slowly, search.other_variants, search.anew, search.profile
         # what explains little of less than a real structure leaves is fitted neither in other ways nor anew
         of_little = ways if model.residuals.mean_square >= THRESHOLDS.real_structure else (ways[0], ways[-1])
@@ -77,18 +90,21 @@ def fit_candidates(
             elif earlier or harder not in of_little:
                 continue
             harder()
-    if thorough and not search_is_over() and search.reached_the_floor():
+    if not search_is_over() and search.reached_the_floor():
         search.hardly_screened()
         if not model.white:
             search.rivals_along()
-    return search.ranking()
 
 
 class _Search:
     """The best fit of each effect and target so far."""
 
-    def __init__(self, magnitudes: Magnitudes, model: Model, screened: Sequence[Screened], least: float = np.inf):
-        self.magnitudes, self.model, self.screened = magnitudes, model, screened
+    def __init__(
+        self, magnitudes: Magnitudes, model: Model, screened: Sequence[Screened], by_motion: Sequence[Screened] = (),
+        least: float = np.inf,
+    ):  # fmt: skip
+        """screened: along the model's fit; by_motion: along the measured motion."""
+        self.magnitudes, self.model, self.screened, self.by_motion = magnitudes, model, screened, by_motion
         self.least = min(model.fit.cost, least)
         # the additions are kept: another one may get the id of one that is gone
         self.done: dict[tuple[int, Schedule], Addition] = {}
@@ -108,19 +124,24 @@ class _Search:
         for one in chosen:
             self._fit(one.addition, one, FROM_SIMULATION)
 
-    def as_promised(self, by_motion: Sequence[Screened]) -> None:
+    def as_promised(self) -> None:
         """Fit the one that the measured motion promises most of without the trust in constant stiffnesses as they were
         found without it, where it has gained less than half, and less than promised nor has any other: those may be far
         from what they are, as what is missing has bent them."""
-        if by_motion and self.model.fit.layout.stated and not search_is_over():
-            one = by_motion[0]
+        if self.by_motion and self.model.fit.layout.stated and not search_is_over():
+            one = self.by_motion[0]
             falls_short = self.found[one.addition.key].gain < THRESHOLDS.half * one.gain
             if falls_short and one.gain > self.ranking()[0].gain:
                 self._note(one.addition, fit(self._untrusting(one.addition)))
 
+    def bending(self) -> Iterable[Screened]:
+        """Errors that bend the motion that all curves are fitted to: no linearisation tells what those would gain."""
+        every = (one.addition for one in self.screened)
+        return (Screened(one, 0.0, 0.0, 1.0) for one in every if _bends_driven_motion(self.magnitudes, one))
+
     def go_on_from(self, found: Iterable[CandidateFit]) -> None:
-        """Fit candidates from where their fits in another noise have ended."""
-        for one in found:
+        """Fit the best candidates from where their fits in another noise have ended."""
+        for one in [one for one in found if one.fit][: THRESHOLDS.shortlist]:
             self._note(one.addition, fit(self._problem(one.addition), one.fit.point))
 
     def other_variants(self) -> None:
@@ -217,13 +238,17 @@ class _Search:
 
     def _note(self, addition: Addition, found: Fit) -> None:
         shapes = found.layout.term(addition).shapes_at(found.theta)
-        c = _coefficient(addition, found)
+        c = coefficient(addition, found)
         if addition.effect.is_doubt(self.magnitudes, addition, c, shapes, found.largest_force):
             return
         self.least = min(self.least, found.cost)
         gain = found.evidence - self.model.fit.evidence - odds_against(addition, found)
         before = self.found.get(addition.key)
-        if before is None or before.fit is None or _odds(addition, gain) > _odds(before.addition, before.gain):
+        if (
+            before is None
+            or before.fit is None
+            or among_variants(addition, gain) > among_variants(before.addition, before.gain)
+        ):
             self.found[addition.key] = CandidateFit(addition, gain, found)
 
     def _problem(self, addition: Addition) -> OutputErrorProblem:
@@ -257,30 +282,12 @@ class _Search:
         return fitted + [one._replace(gain=min(one.gain, least)) for one in rest]
 
 
-def odds_against(addition: Addition, fitted: Fit) -> float:
-    """Nats that it must gain over others, as it was fitted."""
-    return addition.effect.log_prior_odds_against(fitted.layout.structure, _coefficient(addition, fitted))
-
-
-def _coefficient(addition: Addition, fitted: Fit) -> float:
-    return float(fitted.theta[fitted.layout.term(addition).coefficient])
-
-
 def start_from(model: Model, problem: OutputErrorProblem, addition: Addition, screened: Screened | None) -> Point:
     """Where the model without the addition has ended, with the coefficient that its screening estimates."""
     theta = problem.widened(model.fit.layout, model.fit.theta)
     if screened and not addition.effect.changes_law:
         theta[problem.layout.term(addition).coefficient] = screened.coefficient
     return problem.moved(theta, model.fit.trajectories)
-
-
-def _odds(addition: Addition, gain: float) -> float:
-    """Among an effect's own variants: an unmodelled body that was counted in with another must gain more.
-
-    Without a measured force nothing tells it from one beside the model's masses: halving every force and mass leaves
-    the motion as it is.
-    """
-    return gain - (THRESHOLDS.gain if addition.taken_from else 0.0)
 
 
 def _bends_driven_motion(magnitudes: Magnitudes, addition: Addition) -> bool:

@@ -11,13 +11,13 @@ def candidates(
 ) -> list[Addition]:
     """Every admissible addition, several with the same effect and target where the search has several starts."""
     taken = {addition.key for addition in present}
-    sensed = {_carrier(magnitudes, addition.target) for addition in present if addition.effect.attaches_body}
+    sensed = {_carrier(magnitudes, addition.target) for addition in present if addition.attaches_body}
     found = (a for effect in effects.values() for a in effect.candidates(magnitudes.structure, magnitudes))
     return [
         addition
         for addition in found
         if addition.key not in taken
-        and not (addition.effect.attaches_body and _carrier(magnitudes, addition.target) in sensed)
+        and not (addition.attaches_body and _carrier(magnitudes, addition.target) in sensed)
     ]
 
 

@@ -14,7 +14,7 @@ from ..output_error.problem import make_problem
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
 from .acceptance import cost_of_noise, share_removed
-from .candidate_fits import CandidateFit, fit_candidates
+from .candidate_fits import CandidateFit, begin, fit_harder
 from .fitted_model import Model
 from .search_limit import search_is_over
 from .selection_step import SelectionStep, as_found
@@ -66,13 +66,14 @@ def with_rare_ones(
         return step
     least = min([model.fit.cost, *(one.fit.cost for one in step.candidates if one.fit)])
 
-    def fitted(thorough: bool = False) -> SelectionStep:
-        fits = fit_candidates(magnitudes, rare, model, thorough, least=least)
-        return elsewhere_than(magnitudes, found, SelectionStep(model, fits))
+    def fitted() -> SelectionStep:
+        return elsewhere_than(magnitudes, found, SelectionStep(model, search.ranking()))
 
+    search = begin(magnitudes, rare, model, least)
     alone = fitted()
     if _leaving_less(alone, least) and not (step.leaves_noise or alone.leaves_noise):
-        alone = fitted(thorough=True)
+        fit_harder(search, model)
+        alone = fitted()
     if not (alone.leaves_noise or (_leaves_next_to_nothing(alone) and not _comes_near(step, alone))):
         doubted = [] if step.leaves_noise else _leaving_less(alone, least)
         return step._replace(doubted=doubted) if doubted else step
@@ -110,15 +111,19 @@ def _leaving_less(step: SelectionStep, cost: float) -> list[CandidateFit]:
 
 
 def _leaves_next_to_nothing(step: SelectionStep) -> bool:
-    """The best leaves less than the noise again, of much more: the rest may be the form of its law."""
-    near = _near_the_floor(step)
-    return near and share_removed(step.before.residuals, analyse(step.best.fit)) > THRESHOLDS.nearly_all
+    """The best leaves less than the noise again, of much more: the rest may be the form of its law. Or, where it is no
+    law of an element, of which two common ones may add up to it, practically nothing of far more."""
+    if step.best is None:
+        return False
+    enough = THRESHOLDS.nearly_all if _near_the_floor(step) else THRESHOLDS.practically_all
+    is_a_law = step.best.addition.effect.acts_on == "element"
+    return (_near_the_floor(step) or not is_a_law) and _share(step) > enough
 
 
 def _comes_near(step: SelectionStep, rare: SelectionStep) -> bool:
-    """A common one leaves less than the noise again as well; not where that is a share of the noise that counts, of
-    which the rare one explains as much as is asked of what is named."""
-    if not _near_the_floor(step):
+    """A common one leaves as little; not where that is a share of the noise that counts, of which the rare one explains
+    as much as is asked of what is named."""
+    if step.best is None or not (_near_the_floor(step) or _share(step) > THRESHOLDS.practically_all):
         return False
     next_to_none = analyse(step.best.fit).mean_square < 1.0 + THRESHOLDS.some
     noise = cost_of_noise(step.before.records)
@@ -126,8 +131,13 @@ def _comes_near(step: SelectionStep, rare: SelectionStep) -> bool:
     return next_to_none or left - by_rare < THRESHOLDS.most * left
 
 
+def _share(step: SelectionStep) -> float:
+    """Of the mean square above the noise that the best takes away."""
+    return share_removed(step.before.residuals, analyse(step.best.fit))
+
+
 def _near_the_floor(step: SelectionStep) -> bool:
-    return bool(step.best and analyse(step.best.fit).mean_square < THRESHOLDS.near_floor)
+    return analyse(step.best.fit).mean_square < THRESHOLDS.near_floor
 
 
 def _rank(one: CandidateFit) -> tuple[bool, float]:

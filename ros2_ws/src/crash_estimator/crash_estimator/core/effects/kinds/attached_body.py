@@ -1,38 +1,57 @@
-"""A body that the model has not got, moving as an unused acceleration channel shows."""
+"""A body that the model has not got: it moves as an unused acceleration channel shows, or hangs on one that it has."""
 
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 from typing import ClassVar
 
 import numpy as np
 
 from ...kinematics import initial_motion
-from ...structure import Body, Coefficient, Element, Structure
+from ...structure import Body, Coefficient, Element, ModelError, Structure
 from ..effect import Addition, Effect
 from ..estimator_model import ROUGHLY, coefficient_of, heavier, with_action
+
+HUNG = "hung"
+"""Form of one without a sensor: a spring and a damper join it to the body that is the target."""
 
 
 @dataclass(frozen=True)
 class AttachedBody(Effect):
-    """A body that the model has not got, moving as an unused acceleration channel shows; the coefficient: its mass."""
+    """A body that the model has not got, moving as an unused acceleration channel shows, or in the form `hung` as what
+    hangs on a body of the model does; the coefficient: its mass."""
 
     acts_on: ClassVar[str] = "channel"
-    attaches_body: ClassVar[bool] = True
     balances_momentum: ClassVar[bool] = True
+
+    def target_key(self, variant):
+        return "body" if variant == HUNG else self.acts_on
+
+    def attaches_body(self, variant):
+        return variant != HUNG
 
     def possible_targets(self, structure, test):
         if test is None:
             return None
         used = [name for body in structure.bodies for name in (*body.acceleration, body.force) if name]
-        return [c.name for c in test.channels if c.quantity == "acceleration" and c.name not in used]
+        unused = [c.name for c in test.channels if c.quantity == "acceleration" and c.name not in used]
+        return unused + [body.name for body in structure.bodies if body.free]
+
+    def refuse(self, structure, spec):
+        on_body = any(body.free and body.name == spec.target for body in structure.bodies)
+        if on_body != (spec.variant == HUNG):
+            needs = f"`form: {HUNG}`, or a channel" if on_body else "a free body in this form"
+            raise ModelError(f"model {structure.name}: effect {spec.type} on {spec.target} needs {needs}")
 
     def put_to_work(self, structure, test, spec):
         """A driven body that its host carries: the host feels - m a of it, and whatever else pushes it."""
         free = next(body.name for body in structure.bodies if body.free)
-        host = spec.host or free
+        host = spec.target if spec.variant == HUNG else spec.host or free
         starts_with = structure.body_index[spec.taken_from or (free if _body(structure, host).fixed else host)]
         start = tuple(float(values[starts_with]) for values in initial_motion(structure, test))
         body = Body(spec.target, acceleration=(spec.target,), driven=True, carried_by=host, start=start)
+        if spec.variant == HUNG:
+            follows, hangs = _body(structure, host).acceleration, tuple(spec.shape[name] for name in self.shapes)
+            body = replace(body, name=f"{host}.{spec.type}", acceleration=follows, hangs=hangs)
         elements = structure.elements
         if spec.touches:
             free_curve = Coefficient(0.0, estimated=True, min=0.0)
@@ -52,11 +71,18 @@ class AttachedBody(Effect):
         return {addition.taken_from: -1.0} if addition.taken_from else {}
 
     def body_load(self, addition, structure, time, inertial, **shapes):
-        return addition.host, -inertial(addition.target)
+        if addition.variant != HUNG:
+            return addition.host, -inertial(addition.target)
+        from ...hung_body import hung  # the compiler takes long to import: only who needs it waits for it
+
+        steps = np.diff(time, prepend=time[0])
+        return addition.target, -hung(steps, inertial(addition.target), (0.0, 0.0), **shapes)[0]
 
     def candidates(self, structure, magnitudes):
-        """On every unused channel of the axis: what feels the body's inertia, and whether its mass was counted in."""
-        for channel in _unused(structure, magnitudes):
+        """On every unused channel of the axis: what feels the body's inertia, and whether its mass was counted in; and
+        what hangs on every body whose acceleration is measured, where more is than that: alone it may as well be a
+        sensor off the centre of a body that rotates."""
+        for channel in _unused(structure, magnitudes) if "" in self.forms else ():
             for host in structure.bodies:
                 if host.free or (host.fixed and host.force):
                     yield Addition(self, channel, host=host.name)
@@ -64,12 +90,30 @@ class AttachedBody(Effect):
                     for owner in owners:
                         if _body(structure, owner).free:
                             yield Addition(self, channel, host=host.name, taken_from=owner)
+        forces_show = len(structure.equations) > 1
+        for body in structure.bodies if HUNG in self.forms and forces_show else ():
+            if body.free and body.acceleration:
+                for starts in product(*(shape.starts for shape in self.shapes.values())):
+                    shapes = dict(zip(self.shapes, starts, strict=True))
+                    one = Addition(self, body.name, shapes, host=body.name, variant=HUNG)
+                    yield from (one, replace(one, taken_from=body.name))
+
+    def limits(self, magnitudes, addition):
+        """What hangs on a body is the lighter one of the two."""
+        low, high = super().limits(magnitudes, addition)
+        return low, _body(magnitudes.structure, addition.target).mass if addition.variant == HUNG else high
 
     def prior_std(self, magnitudes, addition):
-        return ROUGHLY * sum(body.mass for body in magnitudes.structure.bodies if body.free)
+        structure = magnitudes.structure
+        if addition.variant == HUNG:
+            return ROUGHLY * _body(structure, addition.target).mass
+        return ROUGHLY * sum(body.mass for body in structure.bodies if body.free)
 
     def extensions(self, structure, addition):
-        """The same body between its host and each one that an element joins to the host, pushed by a free curve."""
+        """The same body between its host and each one that an element joins to the host, pushed by a free curve; or one
+        that hangs, with its mass counted in its host's, or not."""
+        if addition.variant == HUNG:
+            return [replace(addition, taken_from=None if addition.taken_from else addition.target)]
         return [replace(addition, touches=name) for name in _neighbours(structure, _body(structure, addition.host))]
 
 
