@@ -73,6 +73,7 @@ MISTAKES = [
     ),
     ("bodies:", "bodys:", "3: unknown key 'bodys'; did you mean 'bodies'?"),
     ("estimate:", "qq:", "11: unknown key 'qq' in elements.rib_spine.stiffness; expected one of estimate, initial"),
+    ("    tension: none", "    initial: 2", "10: unknown key 'initial' in elements.door_rib; it belongs in stiffness"),
     ("name: door", "", "3: key 'name' is missing"),
     ("    between: [door, rib]", "", "7: key 'between' is missing in elements.door_rib"),
     (

@@ -87,8 +87,11 @@ def _message(path: Path, tree: Node, model: type[BaseModel], error: Mapping[str,
     keys = _keys(tree, error["loc"])
     place = f"{path}:{_line(tree, keys)}"
     if error["type"] == "extra_forbidden":
-        known = [name for owner in _models_at(model, keys[:-1]) for name in owner.model_fields]
-        return f"{place}: unknown key {shown(keys[-1])}{_within(keys[:-1])}; {suggestion(keys[-1], known)}"
+        owners = _models_at(model, keys[:-1])
+        known = [name for owner in owners for name in owner.model_fields]
+        deeper = [name for owner in owners for name in _with_key(owner, keys[-1])]
+        hint = f"it belongs in {' or '.join(deeper)}" if deeper else suggestion(keys[-1], known)
+        return f"{place}: unknown key {shown(keys[-1])}{_within(keys[:-1])}; {hint}"
     if error["type"] == "missing" and isinstance(error["loc"][-1], str):
         return f"{place}: key {error['loc'][-1]!r} is missing{_within(keys)}"
     what = WORDING.get(error["type"], error["msg"].removeprefix("Value error, ").removeprefix("Input "))
@@ -140,6 +143,12 @@ def _models_at(annotation: Any, keys: list[Any]) -> list[type[BaseModel]]:
     if origin and keys:  # dict[str, Model], list[Model], tuple[Model, ...]
         return [model for member in arguments for model in _models_at(member, keys[1:])]
     return []
+
+
+def _with_key(model: type[BaseModel], key: Any) -> list[str]:
+    """Its fields that have the key among their own."""
+    fields = model.model_fields.items()
+    return [name for name, field in fields if any(key in one.model_fields for one in _models_at(field.annotation, []))]
 
 
 def _within(keys: list[Any]) -> str:
