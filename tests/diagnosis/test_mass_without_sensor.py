@@ -1,6 +1,7 @@
 """A mass that hangs in a car, which no sensor shows, is named; its truth is simulated by scipy's integrator."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,9 +9,13 @@ from helpers_hung import DAMPING, ENGINE, FREQUENCY, MODEL, crash, hung_model
 
 from crash_estimator.cli.work.diagnose import apply
 from crash_estimator.core.diagnosis import diagnose
+from crash_estimator.core.diagnosis.observation.record import observe
+from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
+from crash_estimator.core.diagnosis.selection.candidates import candidates
 from crash_estimator.core.effects import EFFECTS
+from crash_estimator.core.effects.effect import Addition
 from crash_estimator.model_file import load_model
-from crash_replay.recording import Recording
+from crash_replay.recording import Channel, Recording
 
 
 @pytest.fixture(scope="module")
@@ -53,3 +58,31 @@ def test_the_step_of_a_coarse_recorder_is_its_noise(engine, verdict):
     assert not recordings[0].values[recordings[0].time < 0.0].any()
     found = diagnose(hung_model(), recordings)
     assert (found.verdict, found.complete) == (verdict, True), found.text
+
+
+def sought(structure, recording: Recording) -> set[str]:
+    """Where a mass that hangs is looked for."""
+    magnitudes = measure_magnitudes(structure, [observe(structure, recording)])
+    every = candidates(magnitudes, {"unmodelled_body": EFFECTS["unmodelled_body"]})
+    return {one.target for one in every if one.variant == "hung"}
+
+
+def test_it_is_sought_where_more_than_the_body_s_own_acceleration_shows_it_and_no_sensor_is_left():
+    """Alone it may be a sensor on a body that rotates; and what has a sensor is not supposed without one."""
+    recording = crash(12.0, 8)
+    assert sought(hung_model(), recording) == {"car"}
+    alone = replace(hung_model(), bodies=tuple(replace(body, force=None) for body in hung_model().bodies))
+    assert not sought(alone, recording)
+    channels = (*recording.test.channels, Channel("engine_ax", "acceleration", "engine"))
+    values = np.column_stack([recording.values, recording.values[:, 0]])
+    assert not sought(hung_model(), replace(recording, test=replace(recording.test, channels=channels), values=values))
+
+
+@pytest.mark.parametrize(
+    "shapes, mass, doubted",
+    [((22.0, 0.1), ENGINE, False), ((22.0, 0.7), ENGINE, True), ((3.0, 0.1), ENGINE, True), ((22.0, 0.1), 5.0, True)],
+)
+def test_what_does_not_swing_or_is_next_to_nothing_is_not_told(shapes, mass, doubted):
+    hung, magnitudes = EFFECTS["unmodelled_body"], SimpleNamespace(structure=hung_model())
+    shapes = dict(zip(("frequency", "damping"), shapes, strict=True))
+    assert hung.is_doubt(magnitudes, Addition(hung, "car", variant="hung"), mass, shapes, None) == doubted

@@ -10,6 +10,10 @@ from ...kinematics import initial_motion
 from ...structure import Body, Coefficient, Element, ModelError, Structure
 from ..effect import Addition, Effect
 from ..estimator_model import ROUGHLY, coefficient_of, heavier, with_action
+from .body_inertia import WEIGHED_TO
+
+AT_LIMIT = 1e-3
+"""Share of a limit by which a fit that ends there may miss it."""
 
 HUNG = "hung"
 """Form of one without a sensor: a spring and a damper join it to the body that is the target."""
@@ -79,10 +83,17 @@ class AttachedBody(Effect):
         return addition.target, -hung(steps, inertial(addition.target), (0.0, 0.0), **shapes)[0]
 
     def candidates(self, structure, magnitudes):
-        """On every unused channel of the axis: what feels the body's inertia, and whether its mass was counted in; and
-        what hangs on every body whose acceleration is measured, where more is than that: alone it may as well be a
-        sensor off the centre of a body that rotates."""
-        for channel in _unused(structure, magnitudes) if "" in self.forms else ():
+        """On every unused channel of the axis: what feels the body's inertia, and whether its mass was counted in; or,
+        without any such channel, what hangs on every body whose acceleration is measured."""
+        unused = _unused(structure, magnitudes)
+        if "" in self.forms:
+            yield from self._on_channels(structure, unused)
+        # where its acceleration is all that is measured, it may as well be a sensor off the centre of what rotates
+        if HUNG in self.forms and not unused and len(structure.equations) > 1:
+            yield from self._hanging(structure)
+
+    def _on_channels(self, structure, channels):
+        for channel in channels:
             for host in structure.bodies:
                 if host.free or (host.fixed and host.force):
                     yield Addition(self, channel, host=host.name)
@@ -90,8 +101,10 @@ class AttachedBody(Effect):
                     for owner in owners:
                         if _body(structure, owner).free:
                             yield Addition(self, channel, host=host.name, taken_from=owner)
-        forces_show = len(structure.equations) > 1
-        for body in structure.bodies if HUNG in self.forms and forces_show else ():
+
+    def _hanging(self, structure):
+        """From each of the starts, with the mass counted in its host's and not."""
+        for body in structure.bodies:
             if body.free and body.acceleration:
                 for starts in product(*(shape.starts for shape in self.shapes.values())):
                     shapes = dict(zip(self.shapes, starts, strict=True))
@@ -102,6 +115,17 @@ class AttachedBody(Effect):
         """What hangs on a body is the lighter one of the two."""
         low, high = super().limits(magnitudes, addition)
         return low, _body(magnitudes.structure, addition.target).mass if addition.variant == HUNG else high
+
+    def is_doubt(self, magnitudes, addition, c, shapes, largest_force):
+        """What hangs and does not swing, at the limit of a shape constant, is something else that is slow; and a body's
+        mass is not known to that share."""
+        if addition.variant != HUNG:
+            return False
+        inside = all(
+            one.low < (1.0 - AT_LIMIT) * shapes[name] and (1.0 + AT_LIMIT) * shapes[name] < one.high
+            for name, one in self.shapes.items()
+        )
+        return not inside or c < WEIGHED_TO * _body(magnitudes.structure, addition.target).mass
 
     def prior_std(self, magnitudes, addition):
         structure = magnitudes.structure
