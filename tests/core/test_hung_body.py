@@ -67,6 +67,12 @@ def test_a_part_of_its_carrier_s_mass_is_taken_from_that():
     assert applied(structure, crash(12.0, 1).test).bodies[0].mass == CAR - 50.0
 
 
+def test_no_estimator_takes_a_frequency_for_granted():
+    structure = add_effect(hung_model(), "unmodelled_body", "car", EFFECTS, variant="hung")
+    with pytest.raises(ModelError, match="unmodelled_body on car needs its frequency, in Hz, which no estimator can"):
+        make_estimator(structure, crash(12.0, 1).test, "mrls")
+
+
 @pytest.mark.parametrize(
     "target, variant, said",
     [

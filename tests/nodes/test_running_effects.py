@@ -86,6 +86,23 @@ def test_added_and_removed_while_samples_come(stage, model, recording):
     assert all((state.holds_from, state.missed) == (0, 0) for state in heard["state"])
 
 
+def test_a_mass_without_a_sensor_is_hung_on_a_body_while_samples_come(stage, model, recording):
+    stage.add_estimator(model=model)
+    stage.send_test(recording)
+    stage.send(recording, 0, 150, block=10)
+    stage.wait_for("estimator", 15)
+    hung = {"effect": "unmodelled_body", "target": "block"}
+    refused = stage.call(AddEffect, "estimator/add_effect", **hung, options=["form=hung"])
+    assert not refused.success and "needs its frequency, in Hz" in refused.message
+    options = ["form=hung", "coefficient=2", "frequency=20", "damping=0.1"]
+    assert stage.call(AddEffect, "estimator/add_effect", **hung, options=options).success
+    stage.send(recording, 150, len(recording), block=10)
+    heard = stage.wait_for("estimator", 30)
+    shape = {"frequency": 20.0, "damping": 0.1}
+    structure = add_effect(load_model(model), "unmodelled_body", "block", coefficient=2.0, shape=shape, variant="hung")
+    assert_is(heard["parameters"][15:], from_the_start(structure, recording))
+
+
 def test_what_cannot_be_done_is_said_in_one_line_and_changes_nothing(stage, model, recording):
     stage.add_estimator(model=model)
     stage.send_test(recording)

@@ -30,10 +30,11 @@ def applied(structure: Structure, test: Test, effects: Mapping[str, Effect] = EF
 
 
 def _shape_constants(structure: Structure, spec: EffectSpec, effect: Effect) -> dict[str, float]:
-    """Those given; for others the middle of where a diagnosis starts to search, unless that depends on the crush."""
+    """Those given; for others the middle of where a diagnosis starts to search, unless that depends on the crush or is
+    as good as any other."""
     found = dict(spec.shape)
     for name, shape in effect.shapes_of(spec.variant).items():
-        if name not in found and shape.of_crush:
+        if name not in found and (shape.of_crush or shape.no_usual):
             raise to_be_given(structure, spec, f"its {name}, in {shape.unit}")
         found.setdefault(name, shape.starts[len(shape.starts) // 2])
     return found

@@ -47,6 +47,7 @@ class Shape:
     starts: tuple[float, ...]
     of_crush: bool = False  # limits and starts are shares of the element's largest crush
     both_ways: bool = False  # or of its largest extension, if that is larger and it has tension
+    no_usual: bool = False  # nothing is usual for it: an estimator has to be given it
     of_rate: bool = False  # where its largest rate of crush is below 5 m/s, less in proportion
 
 

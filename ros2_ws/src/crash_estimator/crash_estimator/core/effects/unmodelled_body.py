@@ -13,7 +13,7 @@ EFFECT = AttachedBody(
     "unmodelled_body",
     "kg",
     {
-        "frequency": Shape("Hz", 3.0, 300.0, (4.5, 7.0, 11.0, 18.0, 28.0, 45.0, 70.0, 110.0)),
+        "frequency": Shape("Hz", 3.0, 300.0, (4.5, 7.0, 11.0, 18.0, 28.0, 45.0, 70.0, 110.0), no_usual=True),
         "damping": Shape("", 0.005, 0.7, (0.1,)),
     },
     forms={"": (), "hung": ("frequency", "damping")},
