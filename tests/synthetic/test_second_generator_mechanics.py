@@ -122,6 +122,19 @@ def test_smoothed_frictions_become_dry_friction(branch):
     assert_allclose(smooth, sharp, atol=0.02 * np.abs(sharp).max())
 
 
+def test_a_friction_turns_with_the_contact_that_it_is_in_though_both_begin_at_rest():
+    """Driven in and out from rest: phase and friction turn at the same instant, which is no event of one of them."""
+    f, line = 2e3, 8.0 * K
+    door = Body("car", 1.0, motion=lambda t: 50.0 * np.cos(2.0 * pi * t / 0.2))
+    machine = Machine((door, Body("wall", inf)), {"it": one_way(unload=line, branches=(Dahl(f, 1e-4),))})
+    motion = machine.run(np.arange(0, 1100) * 1e-4)
+    x = motion.x[:, 0]
+    back = (motion.time > 0.1) & (x < x.max() - 1e-3)
+    on_line = K * x.max() - line * (x.max() - x[back])
+    assert back.sum() > 10
+    assert_allclose(motion.forces[back, 0], on_line - f, atol=1e-3 * f)
+
+
 def test_a_linear_damper_decays_as_it_must():
     c = 4000.0
     motion = against_wall(two_way(branches=(Dashpot(c),)))

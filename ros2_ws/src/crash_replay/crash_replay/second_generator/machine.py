@@ -200,7 +200,8 @@ class Machine:
         pairs = self._events(y, held)
         stuck = [(j, side) for j in self._stuck(held) for side in (0, 1)]
         changed = []
-        for k in reversed(fired):  # a joint's branches before its phase, whose switch would change their numbers
+        # a joint's branches before its phase, whose switch would change their numbers
+        for k in reversed(self._at_once(fired, pairs, y, held)):
             if k >= len(pairs):
                 j, side = stuck[k - len(pairs)]
                 held[j] = _slipping(self._joints[j], held[j], 1 if side else -1)
@@ -209,6 +210,13 @@ class Machine:
                 held[j] = self._after(j, guard, t, y, held)
             changed.append(j)
         return changed
+
+    def _at_once(self, fired: list[int], pairs: list[tuple[int, int]], y: np.ndarray, held: list[Held]) -> list[int]:
+        """With those that have fallen through zero with them, as a contact's phase and a friction in it turn with the
+        same rate: the solver names the first of them only."""
+        values = [self._guards(j, y, held)[guard] for j, guard in pairs]
+        passed = {values[k] for k in fired if k < len(pairs) and values[k] < 0.0}
+        return sorted({*fired, *(k for k, value in enumerate(values) if value in passed)})
 
     def _after(self, j: int, guard: int, t: float, y: np.ndarray, held: list[Held]) -> Held:
         joint, (x, v) = self._joints[j], self._crush(y, j)
