@@ -1,6 +1,7 @@
 """A time zero that is stated wrongly, of signals that a filter shows before they begin: a half sine, a mass against a
 spring that carries compression only, which needs no simulator."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -63,6 +64,35 @@ def test_a_gap_of_filtered_signals_is_told_without_a_time_zero():
 def test_filtered_signals_that_are_seen_early_lack_nothing():
     found = diagnosed(late=0.0, cfc=60)
     assert found.verdict == "adequate" and "the signals begin" not in found.text
+
+
+def damped_crash(speed: float, cfc: int) -> Recording:
+    """A damper beside the spring, whose force jumps at contact. The noise, 0.2 % of the peak, is white: it was added
+    behind the filter and does not tell of it."""
+    damping = 0.25 * 2.0 * np.sqrt(STIFFNESS * MASS)
+    still = crash(speed, 0.0, cfc)
+    decay, time = damping / (2.0 * MASS), still.time
+    swing = np.sqrt(STIFFNESS / MASS - decay**2)
+    inside = (time >= 0.0) & (time < np.pi / swing)
+    fading = speed / swing * np.exp(-decay * time)
+    x = np.where(inside, fading * np.sin(swing * time), 0.0)
+    v = np.where(inside, fading * (swing * np.cos(swing * time) - decay * np.sin(swing * time)), 0.0)
+    force = STIFFNESS * x + damping * v
+    clean = replace(still, values=np.stack([-force / MASS, force], axis=1))
+    shown = filter_recording(clean, cfc)
+    noise = 0.002 * np.random.default_rng(int(10 * speed)).standard_normal(shown.values.shape)
+    return replace(shown, values=shown.values + noise * np.abs(shown.values).max(axis=0))
+
+
+@pytest.mark.parametrize("cfc", [60, 180])
+def test_a_force_that_jumps_at_contact_behind_a_filter_that_nothing_tells_lacks_nothing(cfc):
+    """Its jump is seen before time zero, and as long after it what was before."""
+    damped = MODEL.replace("tension: none", "damping: {estimate: true, initial: 9000, min: 0}, tension: none")
+    model = ModelFile.model_validate(yaml.safe_load(damped)).structure()
+    found = diagnose(model, [damped_crash(speed, cfc) for speed in (7.0, 13.0)])
+    assert found.verdict == "adequate" and found.complete
+    (damping,) = (one.value for one in found.constants if one.constant == "damping")
+    assert abs(damping / (0.25 * 2.0 * np.sqrt(STIFFNESS * MASS)) - 1.0) < 0.02
 
 
 def test_a_motion_may_begin_as_much_later_than_its_onset_as_the_filter_shows_it_early():

@@ -28,6 +28,7 @@ class Quiet(NamedTuple):
     ends: int  # ns
     period: int  # us, between samples
     values: Mapping[tuple[str, str], np.ndarray]  # by quantity and channel, of those that rest; empty where too few
+    early: float  # s before the stated time zero that the motion shows
 
     def without_the_last(self, seconds: float) -> "Quiet":
         """As it is where too little would be left."""
@@ -35,7 +36,7 @@ class Quiet(NamedTuple):
         if samples == 0 or not self.values or any(len(rest) < samples + ENOUGH for rest in self.values.values()):
             return self
         values = {key: rest[:-samples] for key, rest in self.values.items()}
-        return Quiet(self.ends - samples * self.period * 1000, self.period, values)
+        return self._replace(ends=self.ends - samples * self.period * 1000, values=values)
 
 
 class Rest(NamedTuple):
@@ -44,11 +45,15 @@ class Rest(NamedTuple):
     ends: int  # ns
     colours: Mapping[str, Sequence[Colour]]
     """By channel, those that its noise may have: of all channels of its quantity in all recordings, and its own."""
+    blurred: float = 0.0
+    """s after the impact for which a filter that runs both ways shows what was before it as well: as long as any of the
+    recordings shows the motion early."""
 
 
 def quiet_of(recording: Recording) -> Quiet:
     """Until the stated time zero, or an earlier onset; motion is no noise of a sensor's."""
     onset = find_onset(recording)
+    early = max(-onset.time, 0.0) if onset and onset.differs else 0.0
     end = min(0, onset.time_ns - onset.precision_ns) if onset and onset.differs else 0
     quiet = recording.time_ns < end
     rests = (channel for channel in recording.test.channels if channel.quantity in RESTS_AT_ZERO)
@@ -57,12 +62,13 @@ def quiet_of(recording: Recording) -> Quiet:
         for channel in rests
         if np.count_nonzero(quiet) >= ENOUGH and np.isfinite(recording.column(channel.name)).any()
     }
-    return Quiet(end, max(round(recording.sample_period * 1e6), 1), values)
+    return Quiet(end, max(round(recording.sample_period * 1e6), 1), values, early)
 
 
 def rest_of(one: Quiet, others: Sequence[Quiet] = ()) -> Rest:
     """Others of the same system; only those that are sampled alike say something of its noise's colour."""
     alike = [one, *(other for other in others if other.period == one.period)]
+    blurred = min(max(each.early for each in alike), EARLIEST)
     of_all = _colours(alike)
     if not seen_early_by(of_all.values()):  # or the end of the rests, which shows the motion, hides a filter
         early = seen_early_by(_colours([each.without_the_last(EARLIEST) for each in alike]).values())
@@ -74,7 +80,7 @@ def rest_of(one: Quiet, others: Sequence[Quiet] = ()) -> Rest:
         rests = _of_quantity(quantity, alike)
         for name in dict.fromkeys(name for name, _ in rests):
             colours[name] = common, colour_of([rest for its, rest in rests if its == name], one.period * 1e-6)
-    return Rest(one.ends, colours)
+    return Rest(one.ends, colours, blurred)
 
 
 def _of_quantity(quantity: str, alike: Sequence[Quiet]) -> list[tuple[str, np.ndarray]]:
