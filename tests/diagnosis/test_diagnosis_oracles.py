@@ -110,6 +110,7 @@ EVERY_EFFECT = (
     EffectSpec("bottoming_out", "foam", 8.0e4, {"stop": 0.08}),
     EffectSpec("yielding", "foam", 3.0e4, {"yield_crush": 0.05}),
     EffectSpec("yielding", "foam", 5.0e4, {"yield_crush": 0.05}, variant="plastic"),
+    EffectSpec("yielding", "foam", 4.0e4, {"fading_crush": 0.06}, variant="smooth"),
     EffectSpec("plastic_unloading", "foam", 2.5e5),
     EffectSpec("load_path", "striker-wall", 1.0e4),
     EffectSpec("load_path", "striker-wall", 4.0e4, {"gap": 0.08}, variant="late"),
@@ -161,6 +162,7 @@ YIELDS = EffectSpec("yielding", "foam", 3.0e4, {"yield_crush": 0.05})
 ON_A_LINE = [
     *((effect, what) for effect in (CUBIC, STOP) for what in ("springs", "all")),
     *((replace(effect, variant="in_curve"), what) for effect in (CUBIC, STOP, YIELDS) for what in ("nothing", "all")),
+    (EffectSpec("yielding", "foam", 4.0e4, {"fading_crush": 0.06}, variant="smooth"), "all"),
     (EVERY_EFFECT[3], "all"),
 ]
 """Effects on a foam that unloads along a line of its own, and what acts on where it is spent."""

@@ -48,6 +48,7 @@ def written(found: Diagnosis, model: str, folder) -> Structure:
         ("cab/limit.plastic/1g/clean/71900000", "plastic", "nothing"),
         ("cab/limit.plastic/1g/clean/34000268", "plastic", "nothing"),  # of a body that pushes on others as well
         ("side/limit.plastic/2g/clean/36000074", "plastic", "nothing"),  # whose usual fits end at a kink
+        ("cab/limit.foam/0.5g/clean/72000000", "smooth", "nothing"),
     ],
 )
 def test_the_form_of_a_law_is_found_and_can_be_read_back(name, form, contacts, tmp_path):

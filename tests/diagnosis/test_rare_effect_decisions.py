@@ -12,7 +12,14 @@ from crash_estimator.core.diagnosis.selection.rare_effects import with_rare_ones
 from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
 from crash_estimator.core.effects import EFFECTS
 
-IN_RARE_FORMS = {"rate_hardening", "viscous_damping", "quadratic_damping", "coulomb_friction", "unmodelled_body"}
+IN_RARE_FORMS = {
+    "rate_hardening",
+    "viscous_damping",
+    "quadratic_damping",
+    "coulomb_friction",
+    "unmodelled_body",
+    "yielding",
+}
 RECORD = SimpleNamespace(below=np.inf, bins=1000, measured=np.zeros((1000, 1)))
 
 

@@ -8,14 +8,18 @@ The way back is the way that it came; form `in_curve`: it is a part of the sprin
 same line. Form `plastic`, of a force limiter that stays bent, as a belt's or a sheet's: from the largest crush so far
 it springs back as stiff as it was at first. `hysteresis` says the same of a small part of an element's force, as of a
 dry slider behind a spring, which yields on the way back as well.
+
+Form `smooth`, a part of the curve too, of foams, honeycombs and all that has no corner (of hardening metals Voce 1948):
+F = - c (X - L (1 - exp(-X / L))) where X > 0, L the `fading_crush` over which the stiffness fades: with c as large as k
+the element's force is k L (1 - exp(-X / L)).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .base import ElementForce, ElementMotion, Shape
-from .kinds.element_force import HALF, PLASTIC
+from .kinds.element_force import HALF, IN_CURVE, PLASTIC, SMOOTH
 
 MAIN_PART = 0.5
 """Of the largest force of an element, that it must yield at to be called plastic: of two names of one law, the one that
@@ -34,23 +38,34 @@ class Loss(ElementForce):
     def prior_std(self, magnitudes, addition):
         """It may be all that there was, which takes the element's force over the crush where it yields."""
         element = magnitudes.element(addition.target)
-        return HALF * magnitudes.force[element] / addition.shapes["yield_crush"]
+        (crush,) = addition.shapes.values()
+        return HALF * magnitudes.force[element] / crush
+
+    def common(self):
+        return replace(self, forms={form: shapes for form, shapes in self.forms.items() if form != SMOOTH})
 
     def is_doubt(self, magnitudes, addition, c, shapes, largest_force):
+        if addition.variant != PLASTIC:
+            return False
         yields_at = c * shapes["yield_crush"]  # N
-        return addition.variant == PLASTIC and yields_at < MAIN_PART * largest_force(addition.target)
+        return yields_at < MAIN_PART * largest_force(addition.target)
 
 
-def force(motion: ElementMotion, yield_crush: float):
-    return -np.maximum(motion.crush - yield_crush, 0.0)
+def force(motion: ElementMotion, yield_crush: float = 0.0, fading_crush: float = 0.0):
+    beyond = np.maximum(motion.crush - yield_crush, 0.0)
+    return -(beyond + fading_crush * np.expm1(-beyond / fading_crush)) if fading_crush else -beyond
 
 
 EFFECT = Loss(
     "yielding",
     "N/m",
-    {"yield_crush": Shape("m", 0.03, 0.97, (0.1, 0.3, 0.6), of_crush=True)},
+    {
+        "yield_crush": Shape("m", 0.03, 0.97, (0.1, 0.3, 0.6), of_crush=True),
+        "fading_crush": Shape("m", 0.03, 3.0, (0.1, 0.4), of_crush=True),
+    },
     force=force,
     of_crush_only=True,
-    lasting=True,
+    forms={"": ("yield_crush",), IN_CURVE: ("yield_crush",), PLASTIC: ("yield_crush",), SMOOTH: ("fading_crush",)},
 )
-"""Limits of `yield_crush` as of a stop, and lower: a limiter yields early."""
+"""Limits of `yield_crush` as of a stop, and lower: a limiter yields early. Of `fading_crush` as low; three times the
+crush, the stiffness has fallen by a quarter at its end, as a cubic term would say as well."""

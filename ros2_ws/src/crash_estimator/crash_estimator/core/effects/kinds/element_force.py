@@ -14,7 +14,8 @@ from ..estimator_model import ROUGHLY, coefficient_of, element_index, typical_mo
 
 IN_CURVE = "in_curve"
 PLASTIC = "plastic"
-OF_THE_CURVE = IN_CURVE, PLASTIC
+SMOOTH = "smooth"
+OF_THE_CURVE = IN_CURVE, PLASTIC, SMOOTH
 
 HALF = 0.5
 """A coefficient's prior standard deviation carries this share of its target's largest force: as large as an effect
@@ -28,21 +29,19 @@ class ElementForce(Effect):
     force(motion: ElementMotion, **shape constants) -> (g,) N per unit of the coefficient
 
     Variants of a function of the crush alone: it is a spring beside the element's own (""); or a part of that one's
-    curve, and unloads along the line that it has ("in_curve"), or, of a `lasting` one on an element of constant
-    stiffness that has none, along a line of that stiffness ("plastic").
+    curve, and unloads along the line that it has ("in_curve"), or, on an element of constant stiffness
+    that has none, along a line of that stiffness ("plastic").
     """
 
     force: Callable[..., np.ndarray] | None = None
     doubles: str = ""  # the element's coefficient that the usual form doubles: where it is estimated, others are left
-    lasting: bool = False  # what it changes of a spring may stay when that springs back
 
     function: ClassVar[str] = "force"
     in_parallel: ClassVar[bool] = True
 
     @property
     def variants(self):
-        of_crush = ("", IN_CURVE, PLASTIC) if self.lasting else ("", IN_CURVE)
-        return of_crush if self.of_crush_only else super().variants
+        return ("", IN_CURVE) if self.of_crush_only and not self.forms else super().variants
 
     def refuse(self, structure, spec):
         if spec.variant != PLASTIC:
@@ -75,7 +74,11 @@ class ElementForce(Effect):
             contained = self.of_crush_only and free_curve and not element.unloading
             doubled = bool(self.doubles and getattr(element, self.doubles).estimated)
             for variant in self.variants:
-                needs = {IN_CURVE: element.unloads and not free_curve, PLASTIC: not (element.unloads or free_curve)}
+                needs = {
+                    IN_CURVE: element.unloads and not free_curve,
+                    PLASTIC: not (element.unloads or free_curve),
+                    SMOOTH: not free_curve,
+                }
                 if not (contained or (doubled and not variant)) and needs.get(variant, True):
                     yield from on_element(self, magnitudes, element.name, variant)
 
