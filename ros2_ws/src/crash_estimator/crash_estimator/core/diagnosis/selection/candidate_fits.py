@@ -275,11 +275,15 @@ class _Search:
         return self.least > THRESHOLDS.out_of_reach * cost_of_noise(self.model.records)
 
     def ranking(self) -> list[CandidateFit]:
-        """Fitted ones first: a screened gain is an estimate, and does not rank above a fit that has gained anything."""
-        fitted = sorted((one for one in self.found.values() if one.fit), key=lambda one: -one.gain)
-        rest = sorted((one for one in self.found.values() if not one.fit), key=lambda one: -one.gain)
-        least = min((one.gain for one in fitted if one.gain > 0.0), default=0.0 if fitted else float("inf"))
-        return fitted + [one._replace(gain=min(one.gain, least)) for one in rest]
+        return ranked(self.found.values())
+
+
+def ranked(found: Iterable[CandidateFit]) -> list[CandidateFit]:
+    """Fitted ones first: a screened gain is an estimate, and does not rank above a fit that has gained anything."""
+    best_first = sorted(found, key=lambda one: -one.gain)
+    fitted, rest = [one for one in best_first if one.fit], [one for one in best_first if not one.fit]
+    least = min((one.gain for one in fitted if one.gain > 0.0), default=0.0 if fitted else float("inf"))
+    return fitted + [one._replace(gain=min(one.gain, least)) for one in rest]
 
 
 def start_from(model: Model, problem: OutputErrorProblem, addition: Addition, screened: Screened | None) -> Point:

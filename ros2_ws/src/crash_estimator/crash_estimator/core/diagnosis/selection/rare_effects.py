@@ -14,7 +14,7 @@ from ..output_error.problem import make_problem
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
 from .acceptance import cost_of_noise, share_removed
-from .candidate_fits import CandidateFit, begin, fit_harder
+from .candidate_fits import CandidateFit, begin, fit_harder, ranked
 from .fitted_model import Model
 from .search_limit import search_is_over
 from .selection_step import SelectionStep, as_found
@@ -78,7 +78,7 @@ def with_rare_ones(
         doubted = [] if step.leaves_noise else _leaving_less(alone, least)
         return step._replace(doubted=doubted) if doubted else step
     best: dict[tuple[str, str], CandidateFit] = {}
-    for one in sorted([*step.candidates, *alone.candidates], key=_rank):
+    for one in ranked([*step.candidates, *alone.candidates]):
         best.setdefault(one.addition.key, one)
     together = list(best.values())
     return SelectionStep(model, together, together)
@@ -138,8 +138,3 @@ def _share(step: SelectionStep) -> float:
 
 def _near_the_floor(step: SelectionStep) -> bool:
     return analyse(step.best.fit).mean_square < THRESHOLDS.near_floor
-
-
-def _rank(one: CandidateFit) -> tuple[bool, float]:
-    """As in `fit_candidates`: what was only screened comes after what was fitted."""
-    return one.fit is None, -one.gain
