@@ -22,7 +22,7 @@ CRUSH_ENDS = np.array([[0, 1], [1, 3], [0, 2], [-1, -1]])  # the last one's crus
 def system(observer: float) -> Linear:
     rng = np.random.default_rng(4)
     shape = len(ENDS), INSTANTS
-    acts = rng.normal(size=(4, INSTANTS))
+    acts = rng.normal(size=(3, INSTANTS))
     knot = np.full((*shape, 2), -1)
     for t in range(3, INSTANTS):  # the curve is used up one knot after the other, on two links
         knot[0, t] = min(t // 8, KNOTS - 2), min(t // 8, KNOTS - 2) + 1
@@ -37,7 +37,8 @@ def system(observer: float) -> Linear:
         loading=loading, knot=knot, weight=rng.normal(size=(*shape, 2)),
         changed=np.ones(INSTANTS, dtype=bool), observer=observer, others=OTHERS,
         start=np.where(KIND[:, None] == FIXED, 0.0, rng.normal(size=(2, len(KIND), OTHERS))),
-        column=np.array([0, 1, 2, 4]), body=np.array([0, 1, 2, 3]), acts=acts,
+        column=np.array([0, 1, 2, 4]), body=np.array([0, 1, 2, 3]),
+        course=np.array([2, 0, 1, 0]), times=rng.normal(size=4), acts=acts,
         remembers=remembers, kept=rng.uniform(0.5, 0.9, memory), by_crush=rng.normal(size=memory),
         by_before=rng.normal(size=memory), recalled=rng.normal(0.0, 50.0, memory),
         touched=np.where(np.arange(INSTANTS) < 3, 0, np.where(np.arange(INSTANTS) < 16, 2, KNOTS)),
@@ -70,7 +71,7 @@ def stepped(s: Linear) -> Motion:
             crush[link, near], crush[link, far] = 1.0, -1.0
     for t, dt in enumerate(s.dt):
         outside = np.zeros((b, n))
-        np.add.at(outside, (s.body, s.column), s.acts[:, t])
+        np.add.at(outside, (s.body, s.column), s.times * s.acts[s.course, t])
         known = np.zeros((len(s.ends), n))
         for link in range(len(s.ends)):
             known[link] += (s.kp[link, t] if crush[link].any() else 0.0) * peak[link]

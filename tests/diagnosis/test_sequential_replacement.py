@@ -8,7 +8,7 @@ from helpers_made_up_fits import candidate
 from crash_estimator.benchmarks.effects_judge import drawn
 from crash_estimator.benchmarks.effects_plan import case_of
 from crash_estimator.core.diagnosis import diagnose
-from crash_estimator.core.diagnosis.selection import pair_search, sequential_replacement
+from crash_estimator.core.diagnosis.selection import sequential_replacement
 from crash_estimator.core.diagnosis.selection.selection_step import SelectionStep
 from crash_estimator.core.diagnosis.selection.thresholds import THRESHOLDS
 
@@ -119,13 +119,3 @@ def test_two_that_leave_next_to_nothing_of_what_was_left_are_taken_too(monkeypat
 
 def test_nothing_is_sought_where_one_effect_leaves_noise(monkeypatch, path):
     assert sought(monkeypatch, {}, model(1.0, FRICTION), path) == ([], None)
-
-
-@pytest.mark.parametrize(("costs", "taken"), [(200.0, False), (400.0, True)])
-def test_two_of_one_effect_are_taken_where_they_leave_less_than_the_best_one(monkeypatch, costs, taken):
-    """Which may not have settled: its motion leaves far more than its fit says."""
-    leader, both = candidate(900.0)._replace(fit=SimpleNamespace(cost=costs)), model(1.5)
-    both.fit.cost = 300.0
-    pair = SimpleNamespace(model=both)
-    monkeypatch.setattr(pair_search, "analyse", lambda fit: SimpleNamespace(mean_square=4.0))
-    assert pair_search.near_the_floor([pair], [leader]) is (pair if taken else None)

@@ -251,6 +251,23 @@ def test_a_time_zero_that_is_not_sure_or_from_which_no_less_is_left_is_not_told(
     assert found == (Begun(moved, TimeZero((there,), "as stated")) if told else None)
 
 
+@pytest.mark.parametrize(("beside", "as_stated", "taken"), [(1, 2, True), (2, 2, False), (2, 3, True)])
+def test_a_late_touch_with_two_effects_does_not_stand_before_two_from_the_stated_time_zero(
+    monkeypatch, beside, as_stated, taken
+):
+    """Of seven simulated cars before a gap, with another speed than stated, all were told a time zero, the speed and a
+    damper: three, where two leave noise."""
+    late, search = Shift(0, "test", 9e-3, 1e-4, 1e-4), onset_search._Search
+    touched, found = Begun(path(beside, noise=True), "its time zero"), Begun(path(as_stated, noise=True))
+    monkeypatch.setattr(onset_search, "as_given", lambda *given: (None, SimpleNamespace(white=False)))
+    monkeypatch.setattr(onset_search, "first_step", lambda *given: SimpleNamespace(leaves_noise=False))
+    for name, value in {"begins": (late,), "as_stated": [], "in_doubt": path(1, noise=True)}.items():
+        monkeypatch.setattr(search, name, value)
+    monkeypatch.setattr(search, "_from_the_touch", lambda self, given: touched)
+    monkeypatch.setattr(search, "_stated_or_early", lambda self, zero, elsewhere: found)
+    assert search(None, (), {}).begun() is (touched if taken else found)
+
+
 @pytest.mark.parametrize(("moves", "rests"), [(0.0, True), (3.0, False)])
 def test_what_moves_before_an_onset_is_not_left_out(monkeypatch, moves, rests):
     """100 samples from the stated time zero on, to an onset that is said to come 10 ms later; noise of 2 m/s^2."""

@@ -10,10 +10,7 @@ from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.output_error.gauss_newton import fit
 from crash_estimator.core.diagnosis.output_error.problem import make_problem
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
-from crash_estimator.core.diagnosis.selection import candidate_fits
 from crash_estimator.core.diagnosis.selection.fitted_model import fit_given, fit_model
-from crash_estimator.core.diagnosis.selection.rare_effects import common_effects
-from crash_estimator.core.effects import EFFECTS
 from crash_estimator.model_file import ModelFile
 from crash_replay.second_generator.cases import case_of, drawn
 
@@ -61,16 +58,3 @@ def test_a_mount_that_yields_is_told_as_such():
     found = diagnose(structure, recordings)
     named = found.steps if found.verdict == "effect_missing" else ()
     assert [step.effect for step in named] == ["yielding"], found.text
-
-
-def test_what_the_measured_motion_promises_is_fitted_without_stiffnesses_as_they_were_found_without_it(monkeypatch):
-    """From these no fit finds it."""
-    _, structure, recordings = drawn_case(first_case(YIELDS))
-    records = [observe(structure, recording) for recording in recordings]
-    magnitudes = measure_magnitudes(structure, records)
-    model, common = fit_given(magnitudes, records, ()), common_effects(structure, EFFECTS)
-    best, *_ = candidate_fits.fit_candidates(magnitudes, common, model, thorough=True)
-    assert best.addition.key == ("yielding", "cab_engine")
-    monkeypatch.setattr(candidate_fits._Search, "as_promised", lambda self: None)
-    without = candidate_fits.fit_candidates(magnitudes, common, model, thorough=True)
-    assert all(one.gain < 0.5 * best.gain for one in without if one.addition.effect.name == "yielding")

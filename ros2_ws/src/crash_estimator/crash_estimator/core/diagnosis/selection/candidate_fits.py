@@ -8,7 +8,7 @@ import numpy as np
 
 from ...effects.effect import Addition, Effect
 from ..output_error.continuation import FROM_MEASURED_MOTION, FROM_SIMULATION, SLOW_CONTACT, SMALL_STEPS, Schedule
-from ..output_error.gauss_newton import MOST_ITERATIONS, Fit, fit, start_along
+from ..output_error.gauss_newton import MOST_ITERATIONS, Fit, fit
 from ..output_error.problem import OutputErrorProblem, Point, make_problem
 from ..output_error.profile_likelihood import closer, profile
 from ..parameterization.magnitudes import Magnitudes
@@ -62,7 +62,7 @@ def begin(magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, l
     given = magnitudes, model.records, model.additions, additions, model.roughness
     by_fit = screen(*given, model.fit)
     by_motion = [] if model.white else screen(*given)
-    search = _Search(magnitudes, model, by_fit, by_motion, least)
+    search = _Search(magnitudes, model, by_fit, least)
     search.from_motion(shortlist(by_motion, THRESHOLDS.shortlist))
     search.from_model(shortlist([one for one in by_fit if one.gain > 0.0], THRESHOLDS.shortlist))
     return search
@@ -72,7 +72,6 @@ def fit_harder(
     search: "_Search", model: Model, in_other_noise: Sequence[CandidateFit] = (), earlier: Sequence[CandidateFit] = ()
 ) -> None:
     """Go on with a search that has begun, as `fit_candidates` says."""
-    search.as_promised()
     search.go_on_from(in_other_noise)
     nothing_left = model.white and earlier  # to stand for what was added, it would have had to explain all alone
     if model.residuals.mean_square < THRESHOLDS.near_floor and not nothing_left:
@@ -92,19 +91,16 @@ def fit_harder(
             harder()
     if not search_is_over() and search.reached_the_floor():
         search.hardly_screened()
-        if not model.white:
-            search.rivals_along()
 
 
 class _Search:
     """The best fit of each effect and target so far."""
 
     def __init__(
-        self, magnitudes: Magnitudes, model: Model, screened: Sequence[Screened], by_motion: Sequence[Screened] = (),
-        least: float = np.inf,
+        self, magnitudes: Magnitudes, model: Model, screened: Sequence[Screened], least: float = np.inf
     ):  # fmt: skip
-        """screened: along the model's fit; by_motion: along the measured motion."""
-        self.magnitudes, self.model, self.screened, self.by_motion = magnitudes, model, screened, by_motion
+        """screened: along the model's fit."""
+        self.magnitudes, self.model, self.screened = magnitudes, model, screened
         self.least = min(model.fit.cost, least)
         # the additions are kept: another one may get the id of one that is gone
         self.done: dict[tuple[int, Schedule], Addition] = {}
@@ -123,16 +119,6 @@ class _Search:
         """Fit candidates from the fit of the model without them."""
         for one in chosen:
             self._fit(one.addition, one, FROM_SIMULATION)
-
-    def as_promised(self) -> None:
-        """Fit the one that the measured motion promises most of without the trust in constant stiffnesses as they were
-        found without it, where it has gained less than half, and less than promised nor has any other: those may be far
-        from what they are, as what is missing has bent them."""
-        if self.by_motion and self.model.fit.layout.stated and not search_is_over():
-            one = self.by_motion[0]
-            falls_short = self.found[one.addition.key].gain < THRESHOLDS.half * one.gain
-            if falls_short and one.gain > self.ranking()[0].gain:
-                self._note(one.addition, fit(self._untrusting(one.addition)))
 
     def bending(self) -> Iterable[Screened]:
         """Errors that bend the motion that all curves are fitted to: no linearisation tells what those would gain."""
@@ -209,19 +195,6 @@ class _Search:
         new = [o for o in [*kin, *delays] if self.found[o.addition.key].fit is None]
         self.from_motion(shortlist(new, len(new)))
 
-    def rivals_along(self) -> None:
-        """Fit other laws on the same target along the motion that the best one has found: as that leaves only noise,
-        another one that is as good is near its own best there, however the usual fits were led astray."""
-        best, *others = [one for one in self.ranking() if one.fit]
-        near = self.model.fit.cost - THRESHOLDS.nearly_all * (self.model.fit.cost - best.fit.cost)
-        rivals = [o for o in others if o.addition.target == best.addition.target and o.fit.cost < near]
-        laws = {(one.addition.key, one.addition.variant): one.fit.cost for one in rivals}
-        for addition in (one.addition for one in self.screened):
-            cost = laws.get((addition.key, addition.variant))
-            if cost is not None:
-                problem = self._untrusting(addition)
-                self._note(addition, fit(problem, start_along(problem, best.fit.trajectories), hopeless=cost))
-
     def _best(self) -> list[CandidateFit]:
         return [one for one in self.ranking() if one.fit][: THRESHOLDS.few]
 
@@ -252,12 +225,10 @@ class _Search:
             self.found[addition.key] = CandidateFit(addition, gain, found)
 
     def _problem(self, addition: Addition) -> OutputErrorProblem:
-        return self._untrusting(addition).starting_as_found(self.model.fit.layout, self.model.fit.theta)
-
-    def _untrusting(self, addition: Addition) -> OutputErrorProblem:
-        """Where constant stiffnesses start as the measured motion shows them."""
+        """Constant stiffnesses start as they were found without it."""
         model = self.model
-        return make_problem(self.magnitudes, model.records, [*model.additions, addition], model.roughness)
+        problem = make_problem(self.magnitudes, model.records, [*model.additions, addition], model.roughness)
+        return problem.starting_as_found(model.fit.layout, model.fit.theta)
 
     def reached_the_floor(self) -> bool:
         """The best so far leaves nothing but noise."""

@@ -5,11 +5,10 @@ from collections.abc import Mapping, Sequence
 from ...effects.effect import Effect
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
-from .acceptance import better, explains_too_little, needed_gain, share_explained, share_removed
-from .candidate_fits import CandidateFit
+from .acceptance import explains_too_little, needed_gain, share_explained, share_removed
 from .even_fit import evenly_fitted
 from .fitted_model import Model
-from .pair_search import Pair, near_the_floor, two_at_once, two_of_one_effect
+from .pair_search import Pair, two_at_once, two_of_one_effect
 from .pruning import up_to_the_least_error, without_the_superseded
 from .rare_effects import common_effects, effects_beside, elsewhere_than, is_rare, with_rare_ones
 from .search_limit import search_is_over
@@ -28,18 +27,15 @@ def forward_selection(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], given: Model, first: SelectionStep
 ) -> tuple[list[SelectionStep], Model]:
     """All steps, and the last model; given: what it starts from, first: its `first_step`."""
-    alike: list[Pair] = []
-    begun: Pair | None = None
-    if not (first.leaves_noise or _explains_nearly_all(first) or search_is_over()):
-        alike = two_of_one_effect(magnitudes, given, first.candidates)
-        begun = near_the_floor(alike, first.candidates)
-    path, final = _from_two(magnitudes, effects, begun) if begun else _one_by_one(magnitudes, effects, given, [], first)
+    path, final = _one_by_one(magnitudes, effects, given, [], first)
     if others := replaced(magnitudes, effects, given, path, final):
         return _from_two(magnitudes, effects, others)
-    next_to_nothing = begun or share_removed(given.residuals, final.residuals) > THRESHOLDS.nearly_all
+    next_to_nothing = share_removed(given.residuals, final.residuals) > THRESHOLDS.nearly_all
     if final.white or next_to_nothing or search_is_over():
         return path, final
     firsts = [*first.doubted[:1], *first.as_recorded]
+    one_is_enough = first.leaves_noise or _explains_nearly_all(first)
+    alike = [] if one_is_enough else two_of_one_effect(magnitudes, given, first.candidates)
     pair = two_at_once(magnitudes, effects, given, firsts, alike, _followed(path))
     if pair is None:
         return path, final
@@ -75,11 +71,6 @@ def _one_by_one(
                 return [once], once.before
         done, first = weighed(magnitudes, common, first, path, evenly), None
         path.append(done)
-        fair = _without(model, done.best) if done.best and done.before is model else model
-        if better(fair, model):
-            # the candidate's fit has shown a better one of the model without it
-            model, path = fair, path[:-1]
-            continue
         needed = needed_gain(model.white, len(model.found))
         if done.best is None or done.best.gain < needed or len(path) > THRESHOLDS.few:
             # where the noise had to be taken larger, the model before the step is the one fitted with it
@@ -127,7 +118,7 @@ def _next_step(
     if not (only_to_noise and far_from_noise):
         step = in_recorded_noise(magnitudes, effects, model, path)
         tried = step.candidates[:1]
-        step = elsewhere_than(magnitudes, rare, step) if rare else step
+        step = elsewhere_than(rare, step)
         in_vain = only_to_noise or (found and not far_from_noise and _all_explain_too_little(step, path))
         if step.leaves_noise or not in_vain:
             return step
@@ -138,9 +129,3 @@ def _all_explain_too_little(step: SelectionStep, path: Sequence[SelectionStep]) 
     before, band = step.before, band_of_steps([*path, step])
     fitted = (as_fitted(before, one) for one in step.candidates if one.fit)
     return all(explains_too_little(before, larger, band) for larger in fitted)
-
-
-def _without(model: Model, found: CandidateFit) -> Model:
-    """The model refitted from where a candidate's fit has ended."""
-    start = model.fit.problem.narrowed(found.fit.layout, found.fit.point)
-    return model.refitted(start, hopeless=model.fit.cost)

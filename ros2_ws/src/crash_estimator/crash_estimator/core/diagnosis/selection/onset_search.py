@@ -83,7 +83,7 @@ class _Search:
             if searched and len(self.in_doubt.added) <= 1 and _leaves_about_noise(self.in_doubt):
                 if zero or not first_step(magnitudes, self.effects, given).leaves_noise:
                     touched = self._from_the_touch(given)
-            if touched and (touched.path.noise or search_is_over()):
+            if touched and (search_is_over() or _leaves_noise_with_few(touched)):
                 return touched
         found = self._stated_or_early(zero, elsewhere)
         settled = touched or found.taken or search_is_over()
@@ -209,6 +209,11 @@ class _Search:
         """Their time zero."""
         moved = [at_its_own_pace(self.structure, one) for one in recordings]
         return [observe(self.structure, *each) for each in zip(moved, rests_of(moved), strict=True)]
+
+
+def _leaves_noise_with_few(begun: Begun) -> bool:
+    """With no more than are believed together, its time zero counted: bodies apart at first may also have a gap."""
+    return begun.path.noise and len(begun.path.added) < THRESHOLDS.most_at_once
 
 
 def _left_by(path: SelectionPath) -> Residuals:

@@ -70,16 +70,6 @@ def _together(
     return Pair(both, path)
 
 
-def near_the_floor(pairs: Sequence[Pair], candidates: Sequence[CandidateFit]) -> Pair | None:
-    """The one that leaves next to nothing, where no candidate alone does."""
-    leader = next(iter(likely(candidates)), None)
-    if not pairs or leader is None or analyse(leader.fit).mean_square < THRESHOLDS.near_floor:
-        return None
-    best = min(pairs, key=lambda pair: pair.model.residuals.mean_square)
-    leaves_less = best.model.fit.cost < leader.fit.cost
-    return best if leaves_less and best.model.residuals.mean_square < THRESHOLDS.near_floor else None
-
-
 def _removes_nearly_all(model: Model, pair: Pair) -> bool:
     return share_removed(model.residuals, pair.model.residuals) > THRESHOLDS.nearly_all
 

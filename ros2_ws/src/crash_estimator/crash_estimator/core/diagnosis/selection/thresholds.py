@@ -39,9 +39,8 @@ class Thresholds(NamedTuple):
     # What is left, in units of the sensors' noise
     near_floor: float = 2.0
     """Mean square below which a driven channel's error, a finer curve, or what rings, may be all that is left: to
-    look again takes as long as the first look. Two of one effect that leave less, as neither alone does, are taken
-    as found: what they leave is then less than the noise. So is a rare effect, unless a common one leaves as
-    little: in two looked-at cases of a gas that gives its heat away the right one left 1.04 and 1.06; a real
+    look again takes as long as the first look. A rare effect that leaves less is taken as found, unless a common one
+    leaves as little: in two looked-at cases of a gas that gives its heat away the right one left 1.04 and 1.06; a real
     impactor's damper, which a Maxwell element would else have taken the place of, came below this too. And times the
     cost of noise from which a model in doubt of masses and zeros is not fitted on: it leaves more than noise. And from
     which on evidence no longer tells what was found from what varies with time: of NHTSA 10146 with another last digit
@@ -79,8 +78,6 @@ class Thresholds(NamedTuple):
       noise and in a larger one, two at once are the last that is looked for. Of 45 looked-at cases of the second
       simulator with more than noise left the best explained 0.80 and more where the right effect was named in the end,
       and less than this in 20 of the 31 that were unexplained;
-    - what the measured motion promises, below which a candidate's fit has stopped short: the one looked-at fit that is
-      mended so had gained nothing of it;
     - what it lacked, that a candidate behind the best must gain under other contacts: of four looked-at ones the three
       that led to the right answer gained 0.62 and more, the one that led astray 0.25;
     - what is left, that goes along with something varying in time, from which no effect is named: of 15 development
@@ -132,9 +129,6 @@ class Thresholds(NamedTuple):
       as two other effects;
     - what the best one takes away, from which a profile over a constant is looked at closer: four looked-at looks that
       led to the right answer took away more than the best one; not varied;
-    - the same, from which another law on its target is fitted along the motion that it has found: of a looked-at force
-      limiter whose fits had ended at a kink, and that was told as hysteresis, it was 0.956; with 0.75 of 70 others none
-      was told otherwise;
     - the misfit, that what varies with time must explain to stand against candidates: with `most` a looked-at search
       ended before it found two effects, at 0.887;
     - the same, that a mended sign or unit must take away: of those 45 none was taken for one;
