@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from crash_estimator.core.diagnosis.mechanics.linear_system import Linear, Sampling
+from crash_estimator.core.diagnosis.mechanics.linear_system import Linear, Sampling, changes
 from crash_estimator.core.diagnosis.output_error.sensitivity_equations import propagate, respond
 from crash_estimator.core.diagnosis.parameterization.layout import DRIVEN, FIXED, FREE
 
@@ -147,3 +147,11 @@ def test_an_output_shows_what_was_a_lag_ago_between_two_steps():
     before = np.concatenate([np.zeros_like(now[:3]), now])
     expected = -2.0 * (0.75 * before[1:-2] + 0.25 * before[:-3])
     assert_allclose(late[3:], expected[3:], atol=1e-12 * np.abs(now).max())
+
+
+def test_a_step_is_solved_anew_where_a_slope_or_its_length_is_another():
+    dt = np.array([0.0, 1e-4, 1e-4, 1e-4 + 1e-18, 2e-4, 2e-4, 2e-4, 2e-4])
+    kx, kv = np.full((2, len(dt)), 5.0), np.zeros((2, len(dt)))
+    kx[1, 6:] = 6.0  # of the second link, from there on
+    kv[0, 7] = 1.0
+    assert np.flatnonzero(changes(dt, kx, kv)).tolist() == [0, 1, 4, 6, 7]
