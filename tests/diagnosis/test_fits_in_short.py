@@ -178,8 +178,6 @@ class Columns(NamedTuple):
     others: int
     column: np.ndarray
     body: np.ndarray
-    course: np.ndarray
-    times: np.ndarray
     acts: np.ndarray
     ends: np.ndarray
     inverse_mass: np.ndarray
@@ -197,8 +195,8 @@ def test_directions_of_masses_forces_and_elements_stand_after_the_parameters_and
     element before it, which pushes both its ends."""
     force, row = np.array([0.0, 6.0, 4.0, 2.0]), np.array([1.0, -3.0, 2.0, 0.0])
     linear = Columns(
-        np.ones((2, 2, 3)), 3, np.array([0, 1]), np.array([0, 1]), np.array([0, 0]), np.array([2.0, 0.5]),
-        np.zeros((1, 4)), np.array([[0, 1]]), np.array([0.5, 1.0]),
+        np.ones((2, 2, 3)), 3, np.array([0, 1]), np.array([0, 1]), np.zeros((2, 4)), np.array([[0, 1]]),
+        np.array([0.5, 1.0]),
     )  # fmt: skip
     links = [SimpleNamespace(force=force)]
     equations = Rows(linear, np.stack([row, np.full(4, 9.0)], axis=1), np.array([0, 1, 30, 31]), links)
@@ -210,9 +208,7 @@ def test_directions_of_masses_forces_and_elements_stand_after_the_parameters_and
     element = range(3 + 2 * MODES, 3 + 3 * MODES)
     assert found.linear.column.tolist() == [0, 1, *range(3, 3 + 3 * MODES), *element]
     assert found.linear.body.tolist() == [0, 1] + [0] * 3 * MODES + [1] * MODES
-    assert found.linear.course.tolist() == [0, 0, *range(1, 1 + 4 * MODES)]
-    assert found.linear.times.tolist() == [2.0, 0.5] + [1.0] * 4 * MODES
-    acts = found.linear.acts[1:].reshape(4, MODES, 4)
+    acts = found.linear.acts[2:].reshape(4, MODES, 4)
     assert_allclose(acts, [-row * modes, 3.0 * modes, -0.5 * force * modes, force * modes])
 
 

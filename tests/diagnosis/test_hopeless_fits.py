@@ -7,8 +7,34 @@ import pytest
 from helpers_made_up_fits import candidate
 
 from crash_estimator.core.diagnosis import THRESHOLDS
-from crash_estimator.core.diagnosis.selection import assumptions, contact_promise, fitted_model
+from crash_estimator.core.diagnosis.selection import assumptions, candidate_fits, contact_promise, fitted_model
 from crash_estimator.core.diagnosis.selection.fitted_model import Model
+
+
+@pytest.mark.parametrize(
+    ("target", "takes_away", "asked"), [("spring", 0.96, True), ("spring", 0.94, False), ("foam", 0.96, False)]
+)
+def test_another_law_that_explains_as_much_is_fitted_along_the_motion_that_the_best_one_has_found(
+    monkeypatch, target, takes_away, asked
+):
+    """In the form that was found, from each of its starts, and no longer than it comes below its own cost."""
+    best, rival = candidate(900.0), candidate(800.0, ("hysteresis", target))
+    best.fit.cost, rival.fit.cost, best.fit.trajectories = 1000.0, 5000.0 - takes_away * 4000.0, "its motion"
+    best.addition.target, best.addition.variant = "spring", ""
+    rival.addition.target, rival.addition.variant = target, "dahl"
+    forms = (("dahl", 0.05), ("dahl", 0.2), ("", 0.05))
+    starts = [SimpleNamespace(key=rival.addition.key, variant=form, shapes=at) for form, at in forms]
+    fits = []
+    monkeypatch.setattr(candidate_fits, "start_along", lambda problem, motion: (problem, motion))
+    monkeypatch.setattr(candidate_fits, "fit", lambda *given, hopeless: (*given, hopeless))
+    search = candidate_fits._Search(None, SimpleNamespace(fit=SimpleNamespace(cost=5000.0)), [])
+    search.screened = [SimpleNamespace(addition=one) for one in starts]
+    search.found = {one.addition.key: one for one in (best, rival)}
+    search._untrusting = lambda addition: f"problem {starts.index(addition)}"
+    search._note = lambda addition, fitted: fits.append((starts.index(addition), fitted))
+    search.rivals_along()
+    wanted = [(k, (f"problem {k}", (f"problem {k}", "its motion"), rival.fit.cost)) for k in (0, 1)]
+    assert fits == (wanted if asked else [])
 
 
 @pytest.mark.parametrize(("cost", "refined"), [(1500.0, True), (2500.0, False)])

@@ -56,7 +56,7 @@ def test_beside_a_rare_effect_only_one_elsewhere_is_looked_at(monkeypatch, rare)
     monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda *given: beside)
     monkeypatch.setattr(forward_selection, "only_screened", lambda *given: "nothing else")
     monkeypatch.setattr(forward_selection, "_all_explain_too_little", lambda *given: False)
-    monkeypatch.setattr(forward_selection, "elsewhere_than", lambda rare, step: elsewhere if rare else step)
+    monkeypatch.setattr(forward_selection, "elsewhere_than", lambda magnitudes, rare, step: elsewhere)
     found = forward_selection._next_step(None, {}, model(50.0, 1), [])
     assert found == ("nothing else" if rare else beside)
 
@@ -144,8 +144,9 @@ def one_by_one(
     monkeypatch.setattr(forward_selection, "as_fitted", lambda before, found: None)
     monkeypatch.setattr(forward_selection, "_all_explain_too_little", hopeless)
     monkeypatch.setattr(forward_selection, "with_rare_ones", with_rare_ones)
-    monkeypatch.setattr(forward_selection, "elsewhere_than", lambda rare, step: step)
+    monkeypatch.setattr(forward_selection, "elsewhere_than", lambda magnitudes, rare, step: step)
     monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done, *path, **noises: done)
+    monkeypatch.setattr(forward_selection, "_without", lambda model, found: model)
     monkeypatch.setattr(
         forward_selection,
         "added",

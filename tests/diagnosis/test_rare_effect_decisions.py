@@ -70,6 +70,7 @@ def test_a_rare_effect_comes_into_the_ranking_where_it_leaves_noise_or_next_to_n
     believed = leads == "gas_cushion" or left_by_rare < 1.1e3
     assert (found.candidates == step.candidates) != believed  # what is not believed is not told
     assert bool(found.doubted) == (not believed and left_by_rare < left_by_common), "but kept, where it leaves less"
+    monkeypatch.setattr(rare_effects, "_leaves_noise_without", lambda *given: False)
     on_the_spring = [SimpleNamespace(target="spring")]  # what was found there leaves what the rare one would follow
     assert with_rare_ones(magnitudes, EFFECTS, step, on_the_spring) is step
     model.records[0] = SimpleNamespace(**vars(RECORD) | {"below": 240.0})  # in a band alone anything leaves noise
@@ -115,8 +116,22 @@ def test_where_noise_is_left_as_given_rare_ones_are_asked_only_where_a_common_on
     assert found.candidates == step.candidates and bool(tried) == asked
 
 
-@pytest.mark.parametrize(("target", "stays"), [("mount", True), ("spring", False)])
-def test_beside_a_rare_effect_nothing_else_is_taken_on_the_same_element(target, stays):
-    """A cushion that was sealed was told with a cubic spring beside it."""
-    step = SelectionStep(SimpleNamespace(), [fitted("maxwell_element", 1.0)])
-    assert bool(rare_effects.elsewhere_than([SimpleNamespace(target=target)], step).candidates) == stays
+@pytest.mark.parametrize(
+    ("target", "beside", "alone", "stays"),
+    [("mount", False, False, True), ("spring", False, True, False), ("spring", True, False, False),
+     ("spring", True, True, True)],
+)  # fmt: skip
+def test_beside_a_rare_effect_nothing_else_is_taken_on_the_same_element_but_what_stands_for_it(
+    monkeypatch, target, beside, alone, stays
+):
+    """A cushion that was sealed was told with a cubic spring beside it; a spring behind a damper, whose first fit had
+    gone astray, as a damper with hysteresis, though beside that damper it left only noise."""
+    other = SimpleNamespace(target=target)
+    problem = SimpleNamespace(narrowed=lambda *given: None)
+    monkeypatch.setattr(rare_effects, "as_found", lambda one: one.addition)
+    monkeypatch.setattr(rare_effects, "make_problem", lambda magnitudes, records, additions, roughness: problem)
+    monkeypatch.setattr(rare_effects, "fit", lambda *given: "alone")
+    monkeypatch.setattr(rare_effects, "analyse", lambda fit: SimpleNamespace(white=alone if fit == "alone" else beside))
+    candidate = fitted("maxwell_element", 1.0)._replace(fit=SimpleNamespace(layout=None, point=None))
+    step = SelectionStep(SimpleNamespace(additions=(other,), records=(), roughness={}), [candidate])
+    assert bool(rare_effects.elsewhere_than(None, [other], step).candidates) == stays

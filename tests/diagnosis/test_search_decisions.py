@@ -62,8 +62,9 @@ def test_care_is_taken_within_reach_of_noise_and_with_a_further_effect_where_mos
     assert candidate_fits.fit_candidates(None, {}, before, thorough=True, earlier=earlier) == tried
 
 
-@pytest.mark.parametrize("noise", [True, False])
-def test_rivals_that_a_screening_does_not_see_are_fitted_beside_what_leaves_noise(monkeypatch, noise):
+@pytest.mark.parametrize(("white", "asked"), [(False, ["hardly screened", "along"]), (True, ["hardly screened"])])
+def test_rivals_that_a_screening_does_not_see_are_fitted_beside_what_leaves_noise(monkeypatch, white, asked):
+    """And others along its motion, but where the model leaves noise as given."""
     called = []
 
     class Search:
@@ -73,15 +74,16 @@ def test_rivals_that_a_screening_does_not_see_are_fitted_beside_what_leaves_nois
         def __getattr__(self, name):
             return lambda *given: None
 
-        reached_the_floor = staticmethod(lambda: noise)
+        reached_the_floor = staticmethod(lambda: True)
         hardly_screened = staticmethod(lambda: called.append("hardly screened"))
+        rivals_along = staticmethod(lambda: called.append("along"))
 
     monkeypatch.setattr(candidate_fits, "_Search", Search)
     monkeypatch.setattr(candidate_fits, "candidates", lambda *given: ())
     monkeypatch.setattr(candidate_fits, "screen", lambda *given: [])
     monkeypatch.setattr(candidate_fits, "search_is_over", lambda: False)
-    candidate_fits.fit_candidates(None, {}, model(white=True), thorough=True)
-    assert called == (["hardly screened"] if noise else [])
+    candidate_fits.fit_candidates(None, {}, model(white=white), thorough=True)
+    assert called == asked
 
 
 @pytest.mark.parametrize(("leaves_noise", "explained", "over", "looked_for"), [
@@ -132,7 +134,6 @@ def test_what_was_followed_one_by_one_or_explains_too_little_is_not_followed_in_
 @pytest.mark.parametrize(("removed", "believed"), [((0.1, 0.2), True), ((0.1, 0.14), False)])
 def test_a_further_step_goes_on_only_where_a_candidate_explains_more_than_too_little(monkeypatch, removed, believed):
     step = SimpleNamespace(leaves_noise=False, before=None, candidates=[candidate(gain) for gain in removed])
-    monkeypatch.setattr(forward_selection, "elsewhere_than", lambda rare, step: step)
     monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda *given: step)
     monkeypatch.setattr(forward_selection, "only_screened", lambda *given: "screened")
     monkeypatch.setattr(forward_selection, "is_rare", lambda addition: False)
@@ -177,6 +178,7 @@ def test_a_search_that_is_over_has_looked_at_all_candidates_once(monkeypatch):
     monkeypatch.setattr(forward_selection, "with_rare_ones", lambda m, e, first, found: first)
     monkeypatch.setattr(forward_selection, "_none_leads", lambda step: False)
     monkeypatch.setattr(forward_selection, "weighed", lambda m, e, done, path, evenly: done)
+    monkeypatch.setattr(forward_selection, "better", lambda one, other: False)
     monkeypatch.setattr(forward_selection, "without_the_superseded", lambda m, path, final: (path, final))
     path, _ = forward_selection._one_by_one(MAGNITUDES, {}, model(), [])
     assert path == [step]

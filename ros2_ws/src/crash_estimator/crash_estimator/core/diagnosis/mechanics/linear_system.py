@@ -7,9 +7,6 @@ from numba import njit
 
 from ... import compile_cache as _compile_cache  # noqa: F401  before any compiled function is defined
 
-SAME_STEP = 1e-9
-"""Share of a step that is a rounding error of the instants."""
-
 
 class Linear(NamedTuple):
     """The linearised equations on g instants, for b bodies, l links, and columns before those of the curve knots."""
@@ -30,10 +27,8 @@ class Linear(NamedTuple):
     observer: float  # 1/s, rate at which free bodies are drawn to the measured motion: -o^2 xi - 2 o xi'
     others: int  # columns before those of the knots
     column: np.ndarray  # (m,) of them, in which something acts ...
-    body: np.ndarray  # (m,) ... on this body,
-    course: np.ndarray  # (m,) one of `acts` ...
-    times: np.ndarray  # (m,) ... times this: an external acceleration (free, driven) or force (fixed)
-    acts: np.ndarray  # (n, g)
+    body: np.ndarray  # (m,) ... on this body:
+    acts: np.ndarray  # (m, g) an external acceleration (free, driven) or force (fixed)
     remembers: np.ndarray  # (m,) the link of each memory, kept z + by_crush X - by_before (the X before)
     kept: np.ndarray  # (m, g)
     by_crush: np.ndarray  # (m, g) 1/m
@@ -52,17 +47,6 @@ class Sampling(NamedTuple):
     fraction: np.ndarray  # (q,) and the rest of a step
     bin: np.ndarray  # (g,) bin of the sample at this instant; -1: no sample here
     weight: np.ndarray  # (g, q) 0 where a sample is not valid, else 1 / (sigma sqrt(samples in the bin))
-
-
-@njit(cache=True)
-def changes(dt, kx, kv):
-    """(g,) whether a slope (l, g), or the step that a slope acts through, is another than at the instant before."""
-    found = np.ones(len(dt), np.bool_)
-    for t in range(1, len(dt)):
-        found[t] = abs(dt[t] - dt[t - 1]) > SAME_STEP * dt[t]
-        for link in range(len(kx)):
-            found[t] |= kx[link, t] != kx[link, t - 1] or kv[link, t] != kv[link, t - 1]
-    return found
 
 
 @njit(cache=True)

@@ -11,7 +11,7 @@ from ..observation.trajectory import Trajectory, measured_crush
 from ..parameterization.layout import DRIVEN, FREE, Experiment
 from ..parameterization.terms import Link
 from .driven_motion import driven_by, start_by
-from .linear_system import Linear, Sampling, changes, ranked
+from .linear_system import Linear, Sampling, ranked
 from .link_force import LinkForce, link_force
 from .masses import body_loads, mass_shares, masses, measured_inertia
 from .outputs import sampling
@@ -52,27 +52,15 @@ class _Actions:
     def __init__(self, inverse_mass: np.ndarray):
         self.inverse_mass = inverse_mass
         self.columns: dict[int, int] = {}  # by parameter
-        self.courses: list[np.ndarray] = []
-        self.acting: list[tuple[int, int, int, float]] = []  # column, body, course, and times what it acts
+        self.acting: list[tuple[int, int, np.ndarray]] = []
 
-    def act(self, parameter: int, body: int, values: np.ndarray, times: float = 1.0) -> None:
-        self._add(self._column(parameter), values, [(body, times)])
+    def act(self, parameter: int, body: int, values: np.ndarray) -> None:
+        self.acting.append((self.columns.setdefault(parameter, 1 + len(self.columns)), body, values))
 
     def push(self, parameter: int, ends: tuple[int, int], force: np.ndarray) -> None:
-        """A link's force, one course for both of its ends."""
-        shares = [(k, sign * self.inverse_mass[k]) for k, sign in zip(ends, (-1.0, 1.0), strict=True)]
-        self._add(self._column(parameter), force, [one for one in shares if one[1]])
-
-    def miss(self, body: int, defect: np.ndarray) -> None:
-        """What the trajectory itself does, in column 0."""
-        self._add(0, defect, [(body, 1.0)])
-
-    def _column(self, parameter: int) -> int:
-        return self.columns.setdefault(parameter, 1 + len(self.columns))
-
-    def _add(self, column: int, course: np.ndarray, shares: Sequence[tuple[int, float]]) -> None:
-        self.acting += [(column, body, len(self.courses), times) for body, times in shares]
-        self.courses.append(course)
+        for k, sign in zip(ends, (-1.0, 1.0), strict=True):
+            if self.inverse_mass[k]:
+                self.act(parameter, k, sign * self.inverse_mass[k] * force)
 
 
 def linearise(
@@ -87,8 +75,8 @@ def linearise(
     """
     layout, record, r = experiment
     mass = masses(layout, theta)
-    inverse = np.where(layout.kind == FREE, 1.0 / mass, 0.0)
-    inverse[[output.body for output in layout.outputs if output.fixed]] = 1.0
+    measured = np.isin(np.arange(len(layout.bodies)), [output.body for output in layout.outputs if output.fixed])
+    inverse = np.where(layout.kind == FREE, 1.0 / mass, measured)
     driven = layout.kind == DRIVEN
     inverse[driven] = 0.0
     actions = _Actions(inverse)
@@ -96,19 +84,19 @@ def linearise(
     for term, k, force, by_shapes in body_loads(layout, theta, record, measured_inertia(layout, record, trajectory)):
         c = float(theta[term.coefficient])
         loads[:, k] += c * force
-        actions.act(term.coefficient, k, force, inverse[k])
+        actions.act(term.coefficient, k, inverse[k] * force)
         for parameter, column in zip(term.shapes.values(), by_shapes, strict=True):
-            actions.act(parameter, k, column, inverse[k] * c)
+            actions.act(parameter, k, inverse[k] * c * column)
     for k, parameter in layout.zeros[r].items():
         loads[:, k] += record.signals[layout.structure.bodies[k].applied].on_grid + theta[parameter]
-        actions.act(parameter, k, np.ones(len(record.time)), inverse[k])
+        actions.act(parameter, k, np.full(len(record.time), inverse[k]))
     rows = loads * inverse
     rows[:, driven] = trajectory.a[:, driven]
     for k, parameter in layout.kicks[r].items():
         rows[:, k] += theta[parameter] * record.kick
         actions.act(parameter, k, record.kick)
     for k, parameter, share in mass_shares(layout):
-        actions.act(parameter, k, rows[:, k], -share * inverse[k])
+        actions.act(parameter, k, -share * inverse[k] * rows[:, k])
     for k, parameter, column in driven_by(experiment, theta):
         actions.act(parameter, k, column)
     sampled, of_outputs = sampling(experiment, theta)
@@ -121,7 +109,7 @@ def linearise(
     if observer:
         defect[:, free] -= observer.acceleration(trajectory)[:, free]
     for own in np.flatnonzero(~driven).tolist():
-        actions.miss(own, defect[:, own])
+        actions.acting.append((0, own, defect[:, own]))
     starts = {actions.columns.setdefault(p, 1 + len(actions.columns)): s for p, s in start_by(experiment)}
     linear, knots = _linear_system(experiment, forces, actions, starts, observer.rate if observer else 0.0)
     every = np.concatenate([np.array(list(actions.columns), dtype=int), knots])
@@ -166,14 +154,18 @@ def _linear_system(
     """For the compiled passes; and the knots' parameters, in the order of their columns. starts: by column, (2, b)."""
     layout, record, _ = experiment
     g, n = len(record.time), len(forces)
-    column, body, course, times = (np.array(each) for each in zip(*actions.acting, strict=True))
-    kx, kv = _stacked([f.kx for f in forces], g), _stacked([f.kv for f in forces], g)
+    column, body, acts = (np.array(each) for each in zip(*actions.acting, strict=True))
+    slopes = np.array([(f.kx, f.kv, f.kp) for f in forces], float).reshape(n, 3, g).transpose(1, 0, 2)
+    kx, kv, kp = np.ascontiguousarray(slopes)  # as one link's are already: for two layouts all would be compiled twice
     memories = [memory for f in forces for memory in f.memories]
     peaks = [f.loading & f.kp.any() for f in forces]  # none is kept that nothing hangs on
     knot, order, touched = ranked(np.array([f.knot for f in forces], np.int64).reshape(n, g, 2), layout.knots)
     start = np.zeros((2, len(layout.bodies), 1 + len(actions.columns)))
     for k, change in starts.items():
         start[:, :, k] = change
+    changed = np.ones(g, bool)
+    changed[1:] = (np.diff(kx) != 0.0).any(axis=0) | (np.diff(kv) != 0.0).any(axis=0)
+    changed[1:] |= np.abs(np.diff(record.dt)) > 1e-9 * record.step
     return Linear(
         dt=record.dt,
         ends=np.array([link.ends for link in layout.links]).reshape(-1, 2),
@@ -182,19 +174,17 @@ def _linear_system(
         kind=layout.kind,
         kx=kx,
         kv=kv,
-        kp=_stacked([f.kp for f in forces], g),
+        kp=kp,
         loading=np.array(peaks, bool).reshape(n, g),
         knot=knot,
         weight=np.array([f.weight for f in forces], float).reshape(n, g, 2),
-        changed=changes(record.dt, kx, kv),
+        changed=changed,
         start=start,
         observer=observer_rate,
         others=1 + len(actions.columns),
         column=column,
         body=body,
-        course=course,
-        times=times,
-        acts=np.array(actions.courses),
+        acts=acts,
         remembers=np.array([k for k, f in enumerate(forces) for _ in f.memories], np.int64),
         kept=_stacked([m.kept for m in memories], g),
         by_crush=_stacked([m.by_crush for m in memories], g),

@@ -134,11 +134,22 @@ def advance(
 
 def equation_error_start(problem: OutputErrorProblem, held: Sequence[int] = ()) -> Point:
     """The measured motion, and parameters that fit the forces along it; held: they stay as they start."""
-    layout = problem.layout
-    stays = shape_parameters(layout) | np.isin(np.arange(layout.size), held)
-    stays[layout.common :] = True
-    point = problem.measured(layout.start.copy())
-    step = solve(layout, equation_error(problem, point), point.theta, FROM_MEASURED_MOTION[0].inflate, stays)
+    stays = np.isin(np.arange(problem.layout.size), held)
+    stays[problem.layout.common :] = True
+    return _fitting_along(
+        problem, problem.measured(problem.layout.start.copy()), FROM_MEASURED_MOTION[0].inflate, stays
+    )
+
+
+def start_along(problem: OutputErrorProblem, trajectories: Sequence[Trajectory]) -> Point:
+    """The motions that another model has found, and parameters that fit the forces along them."""
+    along = problem.moved(problem.layout.start.copy(), trajectories)
+    return _fitting_along(problem, along, 1.0, np.zeros(problem.layout.size, bool))
+
+
+def _fitting_along(problem: OutputErrorProblem, point: Point, inflate: float, stays: np.ndarray) -> Point:
+    stays = stays | shape_parameters(problem.layout)
+    step = solve(problem.layout, equation_error(problem, point), point.theta, inflate, stays)
     return Point(point.theta + step.delta, point.trajectories)
 
 

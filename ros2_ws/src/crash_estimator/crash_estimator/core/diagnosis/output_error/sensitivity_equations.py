@@ -32,8 +32,7 @@ def propagate(system, sampling, out):
     """Fill out (bins, q, columns); system: a `linear_system.Linear`, sampling: its `Sampling`."""
     (
         steps, ends, crush_ends, inverse_mass, kind, kx, kv, kp, loading, knot, weight,
-        changed, start, observer, others, column, body, course, times, acts,
-        remembers, kept, by_crush, by_before, recalled, touched,
+        changed, start, observer, others, column, body, acts, remembers, kept, by_crush, by_before, recalled, touched,
     ) = system  # fmt: skip
     b, links, columns = len(kind), len(ends), _whole(others + touched[-1])
     x, v, a = np.zeros((b, columns)), np.zeros((b, columns)), np.zeros((b, columns))
@@ -63,8 +62,8 @@ def propagate(system, sampling, out):
         for k in range(b):
             for j in range(active):
                 row[k, j] = 0.0
-        for i in range(len(column)):
-            row[body[i], column[i]] += times[i] * acts[course[i], t]
+        for i in range(len(acts)):
+            row[body[i], column[i]] += acts[i, t]
         for k in range(b):
             if kind[k] == DRIVEN:  # no force moves it, and so no knot
                 for j in range(others):
@@ -167,8 +166,7 @@ def respond(system, change):
     """
     (
         steps, ends, crush_ends, inverse_mass, kind, kx, kv, kp, loading, knot, weight,
-        changed, start, observer, others, column, body, course, times, acts,
-        remembers, kept, by_crush, by_before, recalled, _,
+        changed, start, observer, others, column, body, acts, remembers, kept, by_crush, by_before, recalled, _,
     ) = system  # fmt: skip
     b, links = len(kind), len(ends)
     x, v, a, row, peak = np.zeros(b), np.zeros(b), np.zeros(b), np.zeros(b), np.zeros(links)
@@ -181,11 +179,11 @@ def respond(system, change):
     matrix, inverse = np.zeros((free, free)), np.zeros((free, free))
     first, second = 2.0 * observer, observer**2
     rows, found = np.zeros((len(steps), b)), np.zeros((len(steps), b))
-    for i in range(len(column)):
-        share = times[i] * change[column[i]]
+    for i in range(len(acts)):
+        share = change[column[i]]
         if share != 0.0:
             for t in range(len(steps)):
-                rows[t, body[i]] += share * acts[course[i], t]
+                rows[t, body[i]] += share * acts[i, t]
     for t in range(len(steps)):
         dt = steps[t]
         half, sixth = dt / 2.0, dt * dt / 6.0

@@ -151,8 +151,6 @@ def _with_motion(
         others=others + len(more),
         column=np.concatenate([linear.column, *(others + more[n * MODES :][:MODES] for n, _, _ in acting)]),
         body=np.concatenate([linear.body, np.repeat([body for _, body, _ in acting], MODES)]),
-        course=np.concatenate([linear.course, len(linear.acts) + np.arange(len(acting) * MODES)]),
-        times=np.concatenate([linear.times, np.ones(len(acting) * MODES)]),
         acts=np.concatenate([linear.acts, *(values * modes for _, _, values in acting)]),
     )
     return equations._replace(linear=wider, columns=np.insert(equations.columns, others - 1, first + more))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...effects.effect import Addition, Effect
 from ..output_error.continuation import FROM_MEASURED_MOTION, FROM_SIMULATION, SLOW_CONTACT, SMALL_STEPS, Schedule
-from ..output_error.gauss_newton import MOST_ITERATIONS, Fit, fit
+from ..output_error.gauss_newton import MOST_ITERATIONS, Fit, fit, start_along
 from ..output_error.problem import OutputErrorProblem, Point, make_problem
 from ..output_error.profile_likelihood import closer, profile
 from ..parameterization.magnitudes import Magnitudes
@@ -91,6 +91,8 @@ def fit_harder(
             harder()
     if not search_is_over() and search.reached_the_floor():
         search.hardly_screened()
+        if not model.white:
+            search.rivals_along()
 
 
 class _Search:
@@ -195,6 +197,19 @@ class _Search:
         new = [o for o in [*kin, *delays] if self.found[o.addition.key].fit is None]
         self.from_motion(shortlist(new, len(new)))
 
+    def rivals_along(self) -> None:
+        """Fit other laws on the same target along the motion that the best one has found: as that leaves only noise,
+        another one that is as good is near its own best there, however the usual fits were led astray."""
+        best, *others = [one for one in self.ranking() if one.fit]
+        near = self.model.fit.cost - THRESHOLDS.nearly_all * (self.model.fit.cost - best.fit.cost)
+        rivals = [o for o in others if o.addition.target == best.addition.target and o.fit.cost < near]
+        laws = {(one.addition.key, one.addition.variant): one.fit.cost for one in rivals}
+        for addition in (one.addition for one in self.screened):
+            cost = laws.get((addition.key, addition.variant))
+            if cost is not None:
+                problem = self._untrusting(addition)
+                self._note(addition, fit(problem, start_along(problem, best.fit.trajectories), hopeless=cost))
+
     def _best(self) -> list[CandidateFit]:
         return [one for one in self.ranking() if one.fit][: THRESHOLDS.few]
 
@@ -225,10 +240,12 @@ class _Search:
             self.found[addition.key] = CandidateFit(addition, gain, found)
 
     def _problem(self, addition: Addition) -> OutputErrorProblem:
-        """Constant stiffnesses start as they were found without it."""
+        return self._untrusting(addition).starting_as_found(self.model.fit.layout, self.model.fit.theta)
+
+    def _untrusting(self, addition: Addition) -> OutputErrorProblem:
+        """Where constant stiffnesses start as the measured motion shows them."""
         model = self.model
-        problem = make_problem(self.magnitudes, model.records, [*model.additions, addition], model.roughness)
-        return problem.starting_as_found(model.fit.layout, model.fit.theta)
+        return make_problem(self.magnitudes, model.records, [*model.additions, addition], model.roughness)
 
     def reached_the_floor(self) -> bool:
         """The best so far leaves nothing but noise."""

@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from ...effects.effect import Effect
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
-from .acceptance import explains_too_little, needed_gain, share_explained, share_removed
+from .acceptance import better, explains_too_little, needed_gain, share_explained, share_removed
+from .candidate_fits import CandidateFit
 from .even_fit import evenly_fitted
 from .fitted_model import Model
 from .pair_search import Pair, two_at_once, two_of_one_effect
@@ -71,6 +72,11 @@ def _one_by_one(
                 return [once], once.before
         done, first = weighed(magnitudes, common, first, path, evenly), None
         path.append(done)
+        fair = _without(model, done.best) if done.best and done.before is model else model
+        if better(fair, model):
+            # the candidate's fit has shown a better one of the model without it
+            model, path = fair, path[:-1]
+            continue
         needed = needed_gain(model.white, len(model.found))
         if done.best is None or done.best.gain < needed or len(path) > THRESHOLDS.few:
             # where the noise had to be taken larger, the model before the step is the one fitted with it
@@ -118,7 +124,7 @@ def _next_step(
     if not (only_to_noise and far_from_noise):
         step = in_recorded_noise(magnitudes, effects, model, path)
         tried = step.candidates[:1]
-        step = elsewhere_than(rare, step)
+        step = elsewhere_than(magnitudes, rare, step) if rare else step
         in_vain = only_to_noise or (found and not far_from_noise and _all_explain_too_little(step, path))
         if step.leaves_noise or not in_vain:
             return step
@@ -129,3 +135,9 @@ def _all_explain_too_little(step: SelectionStep, path: Sequence[SelectionStep]) 
     before, band = step.before, band_of_steps([*path, step])
     fitted = (as_fitted(before, one) for one in step.candidates if one.fit)
     return all(explains_too_little(before, larger, band) for larger in fitted)
+
+
+def _without(model: Model, found: CandidateFit) -> Model:
+    """The model refitted from where a candidate's fit has ended."""
+    start = model.fit.problem.narrowed(found.fit.layout, found.fit.point)
+    return model.refitted(start, hopeless=model.fit.cost)

@@ -9,12 +9,15 @@ import numpy as np
 
 from ...effects.effect import Addition, Effect
 from ...structure import Structure
+from ..output_error.gauss_newton import fit
+from ..output_error.problem import make_problem
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
 from .acceptance import cost_of_noise, share_removed
 from .candidate_fits import CandidateFit, begin, fit_harder, ranked
+from .fitted_model import Model
 from .search_limit import search_is_over
-from .selection_step import SelectionStep
+from .selection_step import SelectionStep, as_found
 from .thresholds import THRESHOLDS
 
 
@@ -64,7 +67,7 @@ def with_rare_ones(
     least = min([model.fit.cost, *(one.fit.cost for one in step.candidates if one.fit)])
 
     def fitted() -> SelectionStep:
-        return elsewhere_than(found, SelectionStep(model, search.ranking()))
+        return elsewhere_than(magnitudes, found, SelectionStep(model, search.ranking()))
 
     search = begin(magnitudes, rare, model, least)
     alone = fitted()
@@ -81,11 +84,25 @@ def with_rare_ones(
     return SelectionStep(model, together, together)
 
 
-def elsewhere_than(found: Iterable[Addition], step: SelectionStep) -> SelectionStep:
+def elsewhere_than(magnitudes: Magnitudes, found: Iterable[Addition], step: SelectionStep) -> SelectionStep:
     """Without the candidates on the same element: of two there, one of them rare, one follows what the form of the
-    other leaves."""
-    taken = {addition.target for addition in found}
-    return step._replace(candidates=[one for one in step.candidates if one.addition.target not in taken])
+    other leaves. What leaves only noise without that, too, stays: the other one was found in its place."""
+    on_target = {addition.target: addition for addition in found}
+
+    def stays(one: CandidateFit) -> bool:
+        there = on_target.get(one.addition.target)
+        return there is None or (one.fit is not None and _leaves_noise_without(magnitudes, there, step.before, one))
+
+    return step._replace(candidates=[one for one in step.candidates if stays(one)])
+
+
+def _leaves_noise_without(magnitudes: Magnitudes, other: Addition, before: Model, one: CandidateFit) -> bool:
+    """Of a candidate that does so beside the other addition, of the model before it."""
+    if not analyse(one.fit).white:
+        return False
+    kept = [addition for addition in before.additions if addition is not other]
+    problem = make_problem(magnitudes, before.records, [*kept, as_found(one)], before.roughness)
+    return analyse(fit(problem, problem.narrowed(one.fit.layout, one.fit.point))).white
 
 
 def _leaving_less(step: SelectionStep, cost: float) -> list[CandidateFit]:

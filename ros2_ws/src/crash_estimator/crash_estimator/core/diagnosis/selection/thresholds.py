@@ -129,6 +129,9 @@ class Thresholds(NamedTuple):
       as two other effects;
     - what the best one takes away, from which a profile over a constant is looked at closer: four looked-at looks that
       led to the right answer took away more than the best one; not varied;
+    - the same, from which another law on its target is fitted along the motion that it has found: of a looked-at force
+      limiter whose fits had ended at a kink, and that was told as hysteresis, it was 0.956; with 0.75 of 70 others none
+      was told otherwise;
     - the misfit, that what varies with time must explain to stand against candidates: with `most` a looked-at search
       ended before it found two effects, at 0.887;
     - the same, that a mended sign or unit must take away: of those 45 none was taken for one;
