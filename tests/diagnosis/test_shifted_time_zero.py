@@ -255,8 +255,8 @@ def test_a_time_zero_that_is_not_sure_or_from_which_no_less_is_left_is_not_told(
 def test_a_late_touch_with_two_effects_does_not_stand_before_two_from_the_stated_time_zero(
     monkeypatch, beside, as_stated, taken
 ):
-    """Of seven simulated cars before a gap, with another speed than stated, all were told a time zero, the speed and a
-    damper: three, where two leave noise."""
+    """Of seven simulated cars before a gap, with another speed than stated, six were told a time zero, the speed and a
+    damper or the like: three, where two leave noise."""
     late, search = Shift(0, "test", 9e-3, 1e-4, 1e-4), onset_search._Search
     touched, found = Begun(path(beside, noise=True), "its time zero"), Begun(path(as_stated, noise=True))
     monkeypatch.setattr(onset_search, "as_given", lambda *given: (None, SimpleNamespace(white=False)))
