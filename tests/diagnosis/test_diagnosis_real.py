@@ -92,12 +92,13 @@ def test_the_engine_is_named_of_the_filtered_recording_whatever_was_added_after_
 
 @nhtsa
 def test_the_last_digit_of_a_sample_does_not_decide_whether_the_engine_is_named():
-    """A structure that rings leaves two thousand times the noise: fits end elsewhere with every rounding. Which of the
-    engine's sensors stands for it, top, bottom or their mean, does hang on it: of seven copies the mean led in four.
-    """
+    """A structure that rings leaves two thousand times the noise: fits end in one of several minima, by the rounding.
+    Of this copy the engine was told with 250 kg, and not believed, before the best fits were made anew. Which of its
+    sensors stands for it, top, bottom or their mean, does hang on the digit."""
     recording = read_source(NHTSA)
-    last_digit = 1e-7 * np.random.default_rng(1).standard_normal(recording.values.shape)
+    last_digit = 1e-7 * np.random.default_rng(6).standard_normal(recording.values.shape)
     found = diagnose(load_model("frontal_single"), [replace(recording, values=recording.values * (1.0 + last_digit))])
     assert found.verdict == "effect_missing" and found.left.share_explained(found.left_before) > 0.75
     sensors = {"engine_ax", "engine_top_ax", "engine_bottom_ax"}
     assert found.steps[0].effect == "unmodelled_body" and found.steps[0].target in sensors
+    assert found.steps[0].coefficient == pytest.approx(400.0, rel=0.25)

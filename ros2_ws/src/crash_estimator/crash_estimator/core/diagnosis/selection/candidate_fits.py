@@ -44,14 +44,18 @@ def fit_candidates(
     """All candidates, best first; one for each effect and target.
 
     thorough: fit the best of them harder, where none of the most likely ones leaves white noise. in_other_noise: what
-    was found with other noise, best first; its best fits are gone on from. earlier: what was found for the models
-    before this one: beside what was found, only what explains most is fitted harder. least: as of `begin`.
+    was found with other noise, best first; its best fits are gone on from, and of what a real structure leaves the best
+    ones are fitted anew: a fit ends there in one of several minima, and which one it was decided, with the last digit
+    of a sample, what led. earlier: what was found for the models before this one: beside what was found, only what
+    explains most is fitted harder. least: as of `begin`.
     """
     search = begin(magnitudes, effects, model, least)
     if thorough:
         fit_harder(search, model, in_other_noise, earlier)
     else:
         search.go_on_from(in_other_noise)
+        if model.residuals.mean_square >= THRESHOLDS.real_structure:
+            search.anew()
     return search.ranking()
 
 
