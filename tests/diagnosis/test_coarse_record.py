@@ -52,7 +52,7 @@ def test_coloured_noise_is_white_to_the_fit_and_to_the_tests_of_what_it_leaves()
     """Noise behind a pole, which its means over five samples still show: by far the most below 500 Hz."""
     record = observe(oscillator(), oscillator_recording(n=801))
     pole, samples = 0.9, len(record.at)
-    spectrum = NoiseSpectrum(1.0, 1e3, (-pole,), period=record.period)
+    spectrum = NoiseSpectrum(1.0, 1e3, record.period, (-pole,))
     coarse = in_bins(record._replace(spectra=(spectrum,), noise=np.ones(1)))
     strength = np.sqrt(spectrum.density(np.zeros(1))[0]) * (1.0 - pole)
     squares = []

@@ -104,7 +104,7 @@ def test_coloured_noise_is_white_once_it_is_weighted():
     noise = np.zeros(n)
     for k, e in enumerate(rng.standard_normal(n - 1), start=1):
         noise[k] = pole * noise[k - 1] + e
-    spectrum = NoiseSpectrum(1.0 / (1.0 - pole), np.inf, (-pole,), period=period)  # S(0) of s = 1
+    spectrum = NoiseSpectrum(1.0 / (1.0 - pole), np.inf, period, (-pole,))  # S(0) of s = 1
     white = filtered(noise[:, None] / spectrum.std, weights([spectrum], np.inf, n, period))[:, 0]
     correlation = np.corrcoef(white[1:], white[:-1])[0, 1]
     assert np.std(white) == pytest.approx(1.0, abs=0.05) and abs(correlation) < 0.05
@@ -115,9 +115,18 @@ def test_nothing_above_the_band_is_compared():
     n, period = 1000, 1e-3
     time = np.arange(n) * period
     both = np.sin(2.0 * np.pi * 20.0 * time) + np.sin(2.0 * np.pi * 300.0 * time)
-    white = NoiseSpectrum(1.0, np.inf)
+    white = NoiseSpectrum(1.0, np.inf, period)
     left = filtered(both[:, None], weights([white], 100.0, n, period))[:, 0]
     assert np.abs(left - np.sin(2.0 * np.pi * 20.0 * time))[20:-20].max() < 0.1
+
+
+@pytest.mark.parametrize("rests", [False, True])
+def test_means_over_any_number_of_samples_of_a_channel_louder_in_the_crash_are_as_white(rests):
+    """Its noise, that of what is fast in it, was of unknown period: at whole Hz a rounding took the place of 1."""
+    time_ns = np.arange(-400, 3600) * 100_000
+    louder = np.where(time_ns < 0, 1.0, 3.0) * np.random.default_rng(6).standard_normal(len(time_ns))
+    density = sensor_noise(louder, time_ns, rests).density(np.arange(800.0), means_over=6)
+    np.testing.assert_allclose(density, 1.0)
 
 
 @pytest.mark.parametrize("rate", [1000.0, 10_000.0])

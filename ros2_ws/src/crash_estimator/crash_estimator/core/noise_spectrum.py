@@ -75,9 +75,9 @@ class NoiseSpectrum(NamedTuple):
 
     std: float  # of a sample of white noise as strong as this one is below SLOW, or before the filter
     samples: float  # that this variance is known as well as from
+    period: float  # s, between samples
     coefficients: tuple[float, ...] = ()  # a_k of coloured noise; none: white
     corner: float = np.inf  # f0, Hz, of the filter that has cut it off; inf: none has
-    period: float = 1.0  # s
     assumed: bool = False  # too little is recorded at rest to tell it
 
     @property
@@ -98,10 +98,6 @@ class NoiseSpectrum(NamedTuple):
     def density(self, frequency: np.ndarray, means_over: int = 1) -> np.ndarray:
         """Relative to that of white noise of `std`, at frequencies in Hz; means_over: of means over so many samples
         each, which show what is faster than they are at a lower frequency, too."""
-        # Known fault: white noise whose period nobody knows counts as one of 1 s, and over means of samples that are no
-        # power of two rounding decides at whole Hz, where 1 is right. Put right, what leads of NHTSA 10146, which
-        # rings, changes with the last digit of its samples: the engine in three copies of six; as it is, in all that
-        # a test asks.
         found, rate = np.zeros(len(frequency)), 1.0 / (means_over * self.period)
         for k in range(means_over):
             f = frequency + k * rate
@@ -159,7 +155,7 @@ def noise_spectrum(values: np.ndarray, period: float, alike: Sequence[Colour] = 
     """Of noise alone, values (n,); alike: colours that others have, the one best known first: it has the first that
     leaves no more of it than its own does, but by chance."""
     n, values = len(values), values - values.mean()
-    white = NoiseSpectrum(float(np.std(values, ddof=1)), float(n), period=period)
+    white = NoiseSpectrum(float(np.std(values, ddof=1)), float(n), period)
     own = colour_of([values], period)
     colour = next((one for one in alike if _explains(one, own, values)), own)
     a, order = colour.coefficients, len(colour.coefficients)
@@ -171,7 +167,7 @@ def noise_spectrum(values: np.ndarray, period: float, alike: Sequence[Colour] = 
     if worth < TOLD or colour.known(n, n) < ALONE:
         return white
     strength = colour.left(values) * n / (n - 1.0 - order) * _slow_density(a, period)
-    return NoiseSpectrum(float(np.sqrt(strength)), worth, tuple(a), period=period)
+    return NoiseSpectrum(float(np.sqrt(strength)), worth, period, tuple(a))
 
 
 def _explains(colour: Colour, own: Colour, values: np.ndarray) -> bool:
@@ -191,7 +187,7 @@ def _before_the_filter(values: np.ndarray, corner: float, period: float) -> Nois
     frequency = np.arange(len(values)) / (2.0 * len(values) * period)
     inside = (frequency > 0.0) & (frequency < corner)
     power = (dct(values, norm="ortho")[inside] / _gain(frequency[inside] / corner)) ** 2
-    return NoiseSpectrum(float(np.sqrt(power.mean())), float(len(power)), corner=corner, period=period)
+    return NoiseSpectrum(float(np.sqrt(power.mean())), float(len(power)), period, corner=corner)
 
 
 def _corner(a: np.ndarray, rests: Sequence[np.ndarray], period: float) -> float:

@@ -54,7 +54,7 @@ def sensor_noise(
     before, after = values[time_ns < 0], values[time_ns >= 0]
     period, peak = float(np.median(np.diff(time_ns))) * 1e-9, float(np.abs(values).max(initial=0.0))
     standing, rests = rests, rests and len(before) >= ENOUGH
-    at_rest = noise_spectrum(before, period, alike) if rests else NoiseSpectrum(np.nan, 0.0)
+    at_rest = noise_spectrum(before, period, alike) if rests else NoiseSpectrum(np.nan, 0.0, period)
     rest, busy = at_rest.std, np.nan
     if len(after) >= ENOUGH and period * FAST > 1.0 and not rests:
         busy = _highest_frequencies(after)
@@ -62,17 +62,15 @@ def sensor_noise(
         busy = by_differences(after)
     shown = rests and not (at_rest.corner == np.inf and busy < rest / AGREE and len(before) * period < REST)
     if standing and not (shown or derived) and busy < FILTERED * peak:  # a filter's, that the rest is too short for
-        found = NoiseSpectrum(
-            ASSUMED * peak, EFFICIENCY * len(after), corner=SLOWEST_FILTER, period=period, assumed=True
-        )
+        found = NoiseSpectrum(ASSUMED * peak, EFFICIENCY * len(after), period, corner=SLOWEST_FILTER, assumed=True)
     elif np.isnan(rest) or busy > AGREE * rest:
-        found = NoiseSpectrum(float(np.nan_to_num(busy)), EFFICIENCY * len(after))
+        found = NoiseSpectrum(float(np.nan_to_num(busy)), EFFICIENCY * len(after), period)
     elif not at_rest.white or np.isnan(busy) or busy < rest / AGREE:
         found = at_rest
     else:
         n_rest, n_busy = len(before), EFFICIENCY * len(after)
         pooled = np.sqrt((n_rest * rest**2 + n_busy * busy**2) / (n_rest + n_busy))
-        found = NoiseSpectrum(float(pooled), n_rest + n_busy)
+        found = NoiseSpectrum(float(pooled), n_rest + n_busy, period)
     least = max(SMALLEST * peak, _recorder_step(values, SMALLEST * peak) / np.sqrt(12.0), 1e-12)
     return found._replace(std=max(found.std, least), samples=max(found.samples, 2.0))
 

@@ -225,7 +225,8 @@ def observe(structure: Structure, recording: Recording, rest: Rest | None = None
     seen = [(o, signals[o.channel], np.isfinite(recording.column(o.channel))) for o in outputs]
     measured = np.stack([np.where(valid, signal.values, np.nan)[after] for _, signal, valid in seen], axis=1)
     given = [structure.bodies[o.body].noise for o in outputs]
-    spectra = [NoiseSpectrum(g, np.inf) if g else signals[o.channel].spectrum for g, o in zip(given, outputs)]
+    period = recording.sample_period
+    spectra = [NoiseSpectrum(g, np.inf, period) if g else signals[o.channel].spectrum for g, o in zip(given, outputs)]
     mixed = max(seen_early_by(spectra), rest.blurred)
     bin_, valid, bins = bins_of(
         time, at, measured, mixed=mixed, transformed=not all(spectrum.white for spectrum in spectra)
