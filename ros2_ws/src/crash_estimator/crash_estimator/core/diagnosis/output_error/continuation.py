@@ -35,8 +35,7 @@ FROM_MEASURED_MOTION: Schedule = (
 )  # fmt: skip
 """Of a fit that starts from the measured motion. The first observer holds a body within a quarter period of the fastest
 crash (5 ms). A force that jumps at separation is felt by the fit only while it jumps: ramped, it is drawn to the right
-instant. Of NHTSA 10146, filtered, the engine was not named with 63 and 20 in place of 80 and 30: it hangs on such
-roundings."""
+instant. With 63 and 20 in place of 80 and 30 the engine of NHTSA 10146, which rings, is named too, filtered or not."""
 
 SMALL_STEPS: Schedule = (
     *(
