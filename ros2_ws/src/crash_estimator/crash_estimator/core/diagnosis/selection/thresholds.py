@@ -50,7 +50,7 @@ class Thresholds(NamedTuple):
     together: of a real structure none takes that. Below it what explains less than `most` is fitted on, but not
     anew nor in other ways: of 284 looked-at tries two lowered the cost by more than 3 %, by 6 and 7 %. And from which
     the best are fitted anew in a larger noise: of eight copies of NHTSA 10146 that differ in the last digit the engine
-    was named within a quarter of its mass in four without, in all with it; of 206 looked-at cases that reach a larger
+    was named within a quarter of its mass in four without, in seven with it; of 206 looked-at cases that reach a larger
     noise one was told otherwise, at 1.02 times the iterations."""
     out_of_reach: float = 1000.0
     """Mean square, thirty times the noise, from which on no care in fitting makes noise of what is left. At 100 a
