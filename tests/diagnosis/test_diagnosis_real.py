@@ -91,8 +91,8 @@ def test_the_engine_is_named_of_the_filtered_recording_whatever_was_added_after_
 
 
 @nhtsa
-@pytest.mark.parametrize("copy", [1, 6])
-def test_the_last_digit_of_a_sample_does_not_decide_whether_the_engine_is_named(copy):
+@pytest.mark.parametrize(("copy", "first"), [(1, False), (6, True)])
+def test_the_last_digit_of_a_sample_does_not_decide_whether_the_engine_is_named(copy, first):
     """A structure that rings leaves two thousand times the noise: fits end in one of several minima, by the rounding.
     Of copy 6 the engine was told with 249 kg, and not believed, before the best fits were made anew. Which of its
     sensors stands for it, top, bottom or their mean, and whether the car's unloading comes before it, as in copy 1,
@@ -104,3 +104,4 @@ def test_the_last_digit_of_a_sample_does_not_decide_whether_the_engine_is_named(
     sensors = {"engine_ax", "engine_top_ax", "engine_bottom_ax"}
     (engine,) = (s for s in found.steps if s.effect == "unmodelled_body" and s.target in sensors)
     assert engine.coefficient == pytest.approx(400.0, rel=0.25)
+    assert not first or engine is found.steps[0]

@@ -201,7 +201,8 @@ def fit(
             return _failed(problem, point)
         last_good = (point, step) if stage == FREE_RUN else None
         halvings = 0
-        # 1.3: so near the noise a fit is at its floor, where every nat counts; not varied
+        # 1.3: so near the noise a fit is at its floor, where every nat counts; with 1.15 and 1.6 none of 60 looked-at
+        # cases was told otherwise
         enough = max(CONVERGED, COARSE * (step.after - 1.3 * normal.samples))
         if stage == FREE_RUN:
             circles = 0 if least is None or step.before < least[1].before - enough else circles + 1
