@@ -203,7 +203,8 @@ def _element_link(b, k, element, index, curve, magnitudes, additions, terms) -> 
     stiffness, damping = element.stiffness, element.damping
     constant = rate = None
     if stiffness.estimated and curve is None:
-        # wide: what else carries beside it may push the other way, and a wide prior costs a nat; not varied
+        # wide: what else carries beside it may push the other way, and a wide prior costs a nat. Halved, one gap of 60
+        # looked-at cases was told as a stop; doubled, none was told otherwise
         constant = _constant(b, f"{element.name}.stiffness", stiffness, 3.0 * magnitudes.stiffness[k])
     if damping.estimated:
         rate = _constant(b, f"{element.name}.damping", damping, magnitudes.force[k] / magnitudes.rate[k])
