@@ -5,6 +5,7 @@ import signal
 import socket
 import subprocess
 import time
+from collections import Counter
 from pathlib import Path
 from threading import Event
 
@@ -18,6 +19,8 @@ from rerun.chunk import RrdReader
 
 from crash_estimator.viewer.blocks import ForceBlock, ParameterBlock, said_of
 from crash_estimator.viewer.native import viewer_binary
+from crash_estimator.viewer.passes import Pass
+from crash_estimator.viewer.pen import Pen
 from crash_estimator.viewer.sinks import usable_port
 
 pytestmark = pytest.mark.usefixtures("strict")
@@ -245,11 +248,26 @@ def test_a_port_in_use_is_not_taken():
     assert usable_port(taken) == taken
 
 
-def test_drawing_costs_little(crash, tmp_path):
-    """Per sample and estimator; one sample in a message is the dearest case. Here it takes some 0.1 ms."""
-    streams = two_streams(crash, size=1)
-    target = recorder(tmp_path / "cost.rrd")
-    began = time.process_time()
-    feed(target, crash, streams, batches=10)
-    target.close()
-    assert (time.process_time() - began) / (2 * len(crash.time_ns)) < 1e-3
+def test_what_is_written_grows_with_the_lines_and_not_with_the_messages(crash, tmp_path, monkeypatch):
+    """A message for each sample is drawn in as few columns as one for fifty samples."""
+    counts = Counter()
+    columns, write = Pen.columns, Pass.write
+
+    def counted_columns(pen, entity, time_ns, values):
+        counts["columns"] += 1
+        columns(pen, entity, time_ns, values)
+
+    def counted_write(pass_, items):
+        counts["batches"] += bool(items)
+        write(pass_, items)
+
+    monkeypatch.setattr(Pen, "columns", counted_columns)
+    monkeypatch.setattr(Pass, "write", counted_write)
+    per_batch = []
+    for size in (1, 50):
+        counts.clear()
+        target = recorder(tmp_path / f"{size}.rrd")
+        feed(target, crash, two_streams(crash, size=size), batches=3)
+        target.close()
+        per_batch.append(counts["columns"] / counts["batches"])
+    assert per_batch[0] <= 1.1 * per_batch[1]  # 99 each; 750 messages of one sample are a batch
