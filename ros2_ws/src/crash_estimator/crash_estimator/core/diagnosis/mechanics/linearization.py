@@ -75,7 +75,8 @@ def linearise(
     """
     layout, record, r = experiment
     mass = masses(layout, theta)
-    measured = np.isin(np.arange(len(layout.bodies)), [output.body for output in layout.outputs if output.fixed])
+    measured = np.zeros(len(layout.bodies))
+    measured[[output.body for output in layout.outputs if output.fixed]] = 1.0
     inverse = np.where(layout.kind == FREE, 1.0 / mass, measured)
     driven = layout.kind == DRIVEN
     inverse[driven] = 0.0
@@ -164,8 +165,8 @@ def _linear_system(
     for k, change in starts.items():
         start[:, :, k] = change
     changed = np.ones(g, bool)
-    changed[1:] = (np.diff(kx) != 0.0).any(axis=0) | (np.diff(kv) != 0.0).any(axis=0)
-    changed[1:] |= np.abs(np.diff(record.dt)) > 1e-9 * record.step
+    changed[1:] = (kx[:, 1:] != kx[:, :-1]).any(axis=0) | (kv[:, 1:] != kv[:, :-1]).any(axis=0)
+    changed[1:] |= np.abs(record.dt[1:] - record.dt[:-1]) > 1e-9 * record.step
     return Linear(
         dt=record.dt,
         ends=np.array([link.ends for link in layout.links]).reshape(-1, 2),

@@ -23,8 +23,10 @@ from ..parameterization.model_terms import additions_of
 from ..residuals.residuals import Residuals, analyse
 from .acceptance import cost_of_noise, share_removed
 from .assumptions import as_given, select
+from .candidate_fits import begin
 from .fitted_model import Model, fit_model
 from .forward_selection import first_step
+from .rare_effects import common_effects
 from .search_limit import half_of_what_is_left, search_is_over
 from .selection_path import SelectionPath, first_believed
 from .thresholds import THRESHOLDS
@@ -79,7 +81,7 @@ class _Search:
         if any(shift.off(0.0) for shift in elsewhere):
             magnitudes, given = as_given(self.structure, self.as_stated, self.effects)
             zero = self._begins_early(given, early) if early else None
-            searched = not given.white
+            searched = not given.white and self._may_be_explained_open()
             if searched and len(self.in_doubt.added) <= 1 and _leaves_about_noise(self.in_doubt):
                 if zero or not first_step(magnitudes, self.effects, given).leaves_noise:
                     touched = self._from_the_touch(given)
@@ -150,6 +152,16 @@ class _Search:
         """What is found while it is open when bodies touch."""
         with half_of_what_is_left():
             return self._selected(self.coasting_records)
+
+    def _may_be_explained_open(self) -> bool:
+        """Whether one of the likeliest additions leaves less than a real structure does of any model, while it is open
+        when bodies touch."""
+        records = self.coasting_records
+        magnitudes = measure_magnitudes(self.structure, records)
+        given = fit_model(magnitudes, records, additions_of(magnitudes, self.effects))
+        most = THRESHOLDS.real_structure * cost_of_noise(records)
+        likely = common_effects(self.structure, self.effects)
+        return given.fit.cost < most or begin(magnitudes, likely, given).least < most
 
     def _explained_by_the_touch(self, path: SelectionPath) -> bool:
         """Whether about noise is left, or next to nothing of what is left so far, while it is open when bodies touch,
