@@ -113,7 +113,7 @@ def test_an_early_onset_is_not_taken_where_only_what_is_found_without_it_leaves_
     search = onset_search._Search
     monkeypatch.setattr(onset_search, "onsets", lambda recordings: (early,))
     monkeypatch.setattr(onset_search, "as_given", lambda *given: (None, SimpleNamespace(white=False)))
-    monkeypatch.setattr(search, "in_doubt", SimpleNamespace(added=[None, None]))
+    monkeypatch.setattr(search, "_may_be_explained_open", lambda self: False)
     zero = SimpleNamespace(shifts=(early,))
     monkeypatch.setattr(search, "_begins_early", lambda self, given, early: zero)
     monkeypatch.setattr(search, "_may_begin_elsewhere", lambda self, path, elsewhere: False)
