@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from scipy.fft import dct, idct
 
+from crash_estimator.benchmarks.second_judge import judge, right
 from crash_estimator.core.diagnosis.observation.record import observe
 from crash_estimator.core.diagnosis.report.diagnosis import diagnose
 from crash_estimator.core.diagnosis.residuals.band_test import Absorbed, band_test, band_test_of_fit
 from crash_estimator.core.diagnosis.selection.selection_step import bounded
 from crash_estimator.model_file import ModelFile
+from crash_replay.second_generator.cases import case_of
 from crash_replay.synthetic.hidden.cases import draw_case
 
 SAMPLES, PERIOD = 1000, 1e-4
@@ -100,3 +102,8 @@ def test_a_side_impact_that_the_usual_fits_lead_astray_in(effect, seed, noise):
     assert found.verdict == "effect_missing"
     (step,) = found.steps
     assert step.effect == hidden.effect and sorted(step.target.split("-")) == sorted(hidden.target.split("-"))
+
+
+def test_a_law_whose_fits_all_go_astray_is_found_along_the_motion_of_another_that_leaves_hardly_more_than_noise():
+    """A plastic limit: fitted from the measured motion it left 60 times the noise, and a hysteresis was named."""
+    assert right(judge(case_of("cab/limit.plastic/1g/clean/25000072")))

@@ -11,30 +11,37 @@ from crash_estimator.core.diagnosis.selection import assumptions, candidate_fits
 from crash_estimator.core.diagnosis.selection.fitted_model import Model
 
 
-@pytest.mark.parametrize(
-    ("target", "takes_away", "asked"), [("spring", 0.96, True), ("spring", 0.94, False), ("foam", 0.96, False)]
-)
-def test_another_law_that_explains_as_much_is_fitted_along_the_motion_that_the_best_one_has_found(
-    monkeypatch, target, takes_away, asked
+@pytest.mark.parametrize(("target", "takes_away", "left", "at_the_floor", "asked"), [
+    ("spring", 0.96, 1.0, True, True),
+    ("spring", 0.94, 1.0, True, False),  # that far from what leaves only noise it is no rival
+    ("spring", 0.2, 1.9, False, True),  # a fit gone astray may explain it
+    ("spring", 0.2, 2.1, False, False),  # a motion that is itself off is no guide
+    ("foam", 0.96, 1.0, True, False),
+])  # fmt: skip
+def test_other_laws_are_fitted_along_the_motion_that_the_best_one_has_found(
+    monkeypatch, target, takes_away, left, at_the_floor, asked
 ):
-    """In the form that was found, from each of its starts, and no longer than it comes below its own cost."""
+    """In each form, from each of its starts, and no longer than it may come near."""
     best, rival = candidate(900.0), candidate(800.0, ("hysteresis", target))
     best.fit.cost, rival.fit.cost, best.fit.trajectories = 1000.0, 5000.0 - takes_away * 4000.0, "its motion"
-    best.addition.target, best.addition.variant = "spring", ""
-    rival.addition.target, rival.addition.variant = target, "dahl"
-    forms = (("dahl", 0.05), ("dahl", 0.2), ("", 0.05))
-    starts = [SimpleNamespace(key=rival.addition.key, variant=form, shapes=at) for form, at in forms]
-    fits = []
+    best.addition.target, rival.addition.target = "spring", target
+    starts = [SimpleNamespace(key=rival.addition.key, shapes=at) for at in (0.05, 0.2)]
+    fits, hopeless = [], 1000.0 + THRESHOLDS.hopeless
     monkeypatch.setattr(candidate_fits, "start_along", lambda problem, motion: (problem, motion))
     monkeypatch.setattr(candidate_fits, "fit", lambda *given, hopeless: (*given, hopeless))
-    search = candidate_fits._Search(None, SimpleNamespace(fit=SimpleNamespace(cost=5000.0)), [])
+    monkeypatch.setattr(candidate_fits, "cost_of_noise", lambda records: 1000.0 / left)
+    given = SimpleNamespace(fit=SimpleNamespace(cost=5000.0), records=())
+    search = candidate_fits._Search(None, given, [], least=1000.0)
     search.screened = [SimpleNamespace(addition=one) for one in starts]
     search.found = {one.addition.key: one for one in (best, rival)}
+    search.reached_the_floor = lambda: at_the_floor
     search._untrusting = lambda addition: f"problem {starts.index(addition)}"
     search._note = lambda addition, fitted: fits.append((starts.index(addition), fitted))
-    search.rivals_along()
-    wanted = [(k, (f"problem {k}", (f"problem {k}", "its motion"), rival.fit.cost)) for k in (0, 1)]
+    search.along()
+    wanted = [(k, (f"problem {k}", (f"problem {k}", "its motion"), hopeless)) for k in (0, 1)]
     assert fits == (wanted if asked else [])
+    search.found = {}
+    search.along()  # where none was fitted, there is no motion
 
 
 @pytest.mark.parametrize(("cost", "refined"), [(1500.0, True), (2500.0, False)])

@@ -17,14 +17,14 @@ from crash_estimator.core.effects.effect import Addition
 MAGNITUDES = SimpleNamespace(structure=None)
 
 
-CARE = ["slowly", "other_variants", "anew", "profile"]
+CARE = ["along", "slowly", "other_variants", "anew", "profile"]
 
 
 @pytest.mark.parametrize(
     ("out_of_reach", "explains_most", "earlier", "left", "tried"),
     [
         (False, True, (), 50.0, CARE),
-        (False, False, (), 50.0, [CARE[0], CARE[-1]]),
+        (False, False, (), 50.0, [CARE[1], CARE[-1]]),
         (False, False, (), 150.0, CARE),
         (True, False, (), 150.0, CARE),
         (True, True, (), 150.0, []),
@@ -76,7 +76,7 @@ def test_rivals_that_a_screening_does_not_see_are_fitted_beside_what_leaves_nois
 
         reached_the_floor = staticmethod(lambda: True)
         hardly_screened = staticmethod(lambda: called.append("hardly screened"))
-        rivals_along = staticmethod(lambda: called.append("along"))
+        along = staticmethod(lambda: called.append("along"))
 
     monkeypatch.setattr(candidate_fits, "_Search", Search)
     monkeypatch.setattr(candidate_fits, "candidates", lambda *given: ())

@@ -81,9 +81,9 @@ def fit_harder(
     if model.residuals.mean_square < THRESHOLDS.near_floor and not nothing_left:
         search.from_motion(search.bending())
     if not model.white:
-        ways = search.slowly, search.other_variants, search.anew, search.profile
+        ways = search.along, search.slowly, search.other_variants, search.anew, search.profile
         # what explains little of less than a real structure leaves is fitted neither in other ways nor anew
-        of_little = ways if model.residuals.mean_square >= THRESHOLDS.real_structure else (ways[0], ways[-1])
+        of_little = ways if model.residuals.mean_square >= THRESHOLDS.real_structure else (ways[1], ways[-1])
         for harder in ways:
             if search_is_over() or search.reached_the_floor():
                 break
@@ -96,7 +96,7 @@ def fit_harder(
     if not search_is_over() and search.reached_the_floor():
         search.hardly_screened()
         if not model.white:
-            search.rivals_along()
+            search.along()
 
 
 class _Search:
@@ -201,18 +201,22 @@ class _Search:
         new = [o for o in [*kin, *delays] if self.found[o.addition.key].fit is None]
         self.from_motion(shortlist(new, len(new)))
 
-    def rivals_along(self) -> None:
-        """Fit other laws on the same target along the motion that the best one has found: as that leaves only noise,
-        another one that is as good is near its own best there, however the usual fits were led astray."""
-        best, *others = [one for one in self.ranking() if one.fit]
-        near = self.model.fit.cost - THRESHOLDS.nearly_all * (self.model.fit.cost - best.fit.cost)
-        rivals = [o for o in others if o.addition.target == best.addition.target and o.fit.cost < near]
-        laws = {(one.addition.key, one.addition.variant): one.fit.cost for one in rivals}
-        for addition in (one.addition for one in self.screened):
-            cost = laws.get((addition.key, addition.variant))
-            if cost is not None:
-                problem = self._untrusting(addition)
-                self._note(addition, fit(problem, start_along(problem, best.fit.trajectories), hopeless=cost))
+    def along(self) -> None:
+        """Fit other laws on the same target along the motion that the best one has found: where that leaves hardly more
+        than noise, another one that leaves as little is near its own best there, however the usual fits were led
+        astray. Where it leaves no more than noise, only those that come near it."""
+        fitted, lacked = [one for one in self.ranking() if one.fit], self.model.fit.cost
+        hardly_more = min(lacked, THRESHOLDS.near_floor * cost_of_noise(self.model.records))
+        if not fitted or fitted[0].fit.cost > hardly_more:
+            return
+        best, *others = fitted
+        least = THRESHOLDS.nearly_all if self.reached_the_floor() else 0.0
+        near = lacked - least * (lacked - best.fit.cost)
+        rivals = {o.addition.key for o in others if o.addition.target == best.addition.target and o.fit.cost < near}
+        for addition in (one.addition for one in self.screened if one.addition.key in rivals):
+            problem = self._untrusting(addition)
+            start = start_along(problem, best.fit.trajectories)
+            self._note(addition, fit(problem, start, hopeless=self.least + THRESHOLDS.hopeless))
 
     def _best(self) -> list[CandidateFit]:
         return [one for one in self.ranking() if one.fit][: THRESHOLDS.few]
