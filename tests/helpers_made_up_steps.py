@@ -20,5 +20,6 @@ def model(left: float, additions: int = 0, evidence: float = 0.0) -> SimpleNames
 
 
 def step(before: SimpleNamespace, gain: float = 500.0) -> SelectionStep:
-    addition = SimpleNamespace(effect=SimpleNamespace(name="friction", acts_on="element"), key=("friction", "spring"))
+    effect = SimpleNamespace(name="friction", acts_on="element", distorts="")
+    addition = SimpleNamespace(effect=effect, key=("friction", "spring"))
     return SelectionStep(before, [CandidateFit(addition, gain, SimpleNamespace(evidence=gain))])

@@ -122,6 +122,31 @@ def test_what_explains_half_may_lead_and_anything_near_noise_or_of_a_real_struct
     assert none_leads(SelectionStep(model(left), candidates)) == none
 
 
+@pytest.mark.parametrize("errs_from", [1, 2, 3])
+def test_an_error_of_a_channel_of_little_weight_ends_the_search(monkeypatch, errs_from):
+    monkeypatch.setattr(forward_selection, "_errs_by_little", lambda path: len(path) >= errs_from)
+    path, final = one_by_one(monkeypatch, 50.0, step)
+    assert len(final.additions) == len(path) - 1 == errs_from - 1
+    assert path[-1].before is final, "it is told beside what was not added"
+
+
+@pytest.mark.parametrize(("distorts", "inflated", "share", "errs"), [
+    ("delay", True, 0.96, True),
+    ("delay", True, 0.94, False),
+    ("", True, 0.96, False),  # it is no error of a channel
+    ("delay", False, 0.96, False),  # only noise is left with it
+])  # fmt: skip
+def test_when_an_error_of_a_channel_is_of_little_weight(monkeypatch, distorts, inflated, share, errs):
+    """That with what was found before nearly all of the misfit is explained, in the band that the model speaks for."""
+    first, last = step(model(100.0)), step(model(3.0, 1))
+    last.before.fit.problem.noise_is_inflated = inflated
+    last.best.addition.effect.distorts = distorts
+    explained = {100.0: None, 3.0: SimpleNamespace(share_explained=lambda given: share)}
+    monkeypatch.setattr(forward_selection, "band_of_steps", lambda path: 60)
+    monkeypatch.setattr(forward_selection, "in_band", lambda fit, residuals, cfc: explained[residuals.mean_square])
+    assert forward_selection._errs_by_little([first, last]) == errs
+
+
 def one_by_one(
     monkeypatch,
     left: float,

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from ...effects.effect import Effect
 from ..parameterization.magnitudes import Magnitudes
+from ..residuals.in_band import in_band
 from ..residuals.residuals import analyse
 from .acceptance import better, explains_too_little, needed_gain, share_explained, share_removed
 from .candidate_fits import CandidateFit
@@ -13,7 +14,16 @@ from .pair_search import Pair, two_at_once, two_of_one_effect
 from .pruning import up_to_the_least_error, without_the_superseded
 from .rare_effects import common_effects, effects_beside, elsewhere_than, is_rare, with_rare_ones
 from .search_limit import search_is_over
-from .selection_step import SelectionStep, added, as_fitted, band_of_steps, in_recorded_noise, only_screened, weighed
+from .selection_step import (
+    SelectionStep,
+    added,
+    as_fitted,
+    band_of_steps,
+    in_recorded_noise,
+    only_screened,
+    weighed,
+    weighed_beside_a_second,
+)
 from .sequential_replacement import replaced
 from .thresholds import THRESHOLDS
 
@@ -70,7 +80,10 @@ def _one_by_one(
             once = weighed(magnitudes, common, first, noises=1)
             if _none_leads(once):
                 return [once], once.before
-        done, first = weighed(magnitudes, common, first, path, evenly), None
+        done = weighed(magnitudes, common, first, path, evenly)
+        if not path:
+            done = weighed_beside_a_second(magnitudes, common, first, done)
+        first = None
         path.append(done)
         fair = _without(model, done.best) if done.best and done.before is model else model
         if better(fair, model):
@@ -81,6 +94,8 @@ def _one_by_one(
         if done.best is None or done.best.gain < needed or len(path) > THRESHOLDS.few:
             # where the noise had to be taken larger, the model before the step is the one fitted with it
             return without_the_superseded(magnitudes, path, done.before)
+        if _errs_by_little(path):
+            return path, done.before
         larger = added(magnitudes, model, done.best)
         evenly = None if larger.white else evenly_fitted(as_fitted(done.before, done.best), band_of_steps(path), larger)
         if evenly and explains_too_little(done.sized, evenly, band_of_steps(path)):
@@ -135,6 +150,19 @@ def _all_explain_too_little(step: SelectionStep, path: Sequence[SelectionStep]) 
     before, band = step.before, band_of_steps([*path, step])
     fitted = (as_fitted(before, one) for one in step.candidates if one.fit)
     return all(explains_too_little(before, larger, band) for larger in fitted)
+
+
+def _errs_by_little(path: Sequence[SelectionStep]) -> bool:
+    """Whether the best of the last step is an error of a channel, of so little weight beside what was found before that
+    it may be the form of that: a sensor that lags by t shows a spring k as a damper of - k t.
+
+    Only where more than noise is left; what a structure leaves in the band is of no form that is known.
+    """
+    first, last = path[0], path[-1]
+    if not (last.best.addition.effect.distorts and last.before.fit.problem.noise_is_inflated):
+        return False
+    left, given = (in_band(one.sized.fit, one.sized.residuals, band_of_steps(path)) for one in (last, first))
+    return left.share_explained(given) > THRESHOLDS.nearly_all
 
 
 def _without(model: Model, found: CandidateFit) -> Model:

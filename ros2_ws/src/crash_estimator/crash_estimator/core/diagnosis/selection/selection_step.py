@@ -15,7 +15,7 @@ from ..output_error.normal_equations import may_diverge
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.in_band import band_of
 from ..residuals.residuals import analyse
-from .acceptance import better
+from .acceptance import better, share_explained
 from .candidate_fits import CandidateFit, fit_candidates, screen_candidates
 from .even_fit import evenly_fitted
 from .fitted_model import Model, fit_model
@@ -78,7 +78,7 @@ def weighed(
     path: the steps before; evenly: the model before it, as it was fitted with all outputs alike; noises: so many at
     most, each as large as what the best candidate leaves in the one before.
     """
-    model, found = done.before, done.candidates
+    recorded, model, found = done, done.before, done.candidates
     if done.leaves_noise:
         return done
     fits = {one.addition.key for one in found if one.fit}
@@ -89,19 +89,53 @@ def weighed(
         noisier = _noise_left_by(done, model.records)
         if larger and _as_loud(noisier, done.before.records):
             break
-        before = _fitted_from_either(magnitudes, noisier, model)
-        if before.white:  # so it looks; the sensors' own noise decides
-            decided = analyse(fit(model.fit.problem, before.fit.point), sharply=True).band_test
-            before = before._replace(residuals=before.residuals._replace(band_test=decided))
+        gone_on = []
         if fits:
             # what has come up in a larger noise is gone on from in the next, but where a jump would hold it where it is
             new = [o for o in done.candidates[:1] if o.addition.key not in fits and not o.addition.effect.profiled]
-            others = fit_candidates(magnitudes, effects, before, in_other_noise=[*new, *found])
-        else:
-            others = screen_candidates(magnitudes, effects, before)
-        done = SelectionStep(before, others, found, doubted=done.doubted)
+            gone_on = [*new, *found]
+        done = _in_larger_noise(magnitudes, effects, recorded, noisier, gone_on)
     known = [evenly] if evenly else []
     return done._replace(evenly=evenly_fitted(done.before, band_of_steps([*path, done]), *known))
+
+
+def weighed_beside_a_second(
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], recorded: SelectionStep, done: SelectionStep
+) -> SelectionStep:
+    """A first step in which nothing counts, against what the best candidate leaves together with a second one: most of
+    what it leaves alone may be the other's, and noise as large as that hides it.
+
+    recorded: the step in the sensors' noise, done: as it was weighed; it stays so where the best one explains less than
+    half, where two leave hardly less, or where nothing counts then either.
+    """
+    if recorded.best is None or done.best or done.leaves_noise or search_is_over():
+        return done
+    model, band = recorded.before, band_of_steps([recorded])
+    larger = as_fitted(model, recorded.best)
+    if share_explained(model, larger, band) < THRESHOLDS.half:
+        return done
+    noise = _noise_left_by(in_recorded_noise(magnitudes, effects, larger, [recorded]), model.records)
+    if _quietness(noise) < _quietness(done.before.records) + THRESHOLDS.same_noise:
+        return done
+    again = _in_larger_noise(magnitudes, effects, recorded, noise, recorded.candidates)
+    return again._replace(evenly=evenly_fitted(again.before, band)) if again.best else done
+
+
+def _in_larger_noise(
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], recorded: SelectionStep, noisier: Sequence[ObservedRecord],
+    found: Sequence[CandidateFit],
+) -> SelectionStep:  # fmt: skip
+    """A step in the sensors' noise, done in that of other records; found: candidates that are gone on from, without
+    which all are only screened."""
+    before = _fitted_from_either(magnitudes, noisier, recorded.before)
+    if before.white:  # so it looks; the sensors' own noise decides
+        decided = analyse(fit(recorded.before.fit.problem, before.fit.point), sharply=True).band_test
+        before = before._replace(residuals=before.residuals._replace(band_test=decided))
+    if found:
+        candidates = fit_candidates(magnitudes, effects, before, in_other_noise=found)
+    else:
+        candidates = screen_candidates(magnitudes, effects, before)
+    return SelectionStep(before, candidates, recorded.candidates, doubted=recorded.doubted)
 
 
 def _fitted_from_either(magnitudes: Magnitudes, records: Sequence[ObservedRecord], model: Model) -> Model:
