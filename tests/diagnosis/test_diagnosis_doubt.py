@@ -1,6 +1,5 @@
 """Whether a diagnosis warns that the model itself may be wrong: of models that were made wrong, not of right ones."""
 
-import re
 import sys
 from dataclasses import replace
 from functools import cache
@@ -52,13 +51,11 @@ def test_a_model_that_explains_little_and_is_not_mended_is_doubted_below_the_ver
     status = said_of_a_share_of_the_mass(0.2, monkeypatch, tmp_path)
     said = capsys.readouterr().out.splitlines()
     assert status == 0 and said[0].startswith("unexplained")
-    explains, *rest = said[1].partition("% of car_ax")
-    assert re.fullmatch(
-        r"the model itself or the recording may be wrong \(as given it explains (2[5-9]|3[0-7])", explains
+    text = (
+        "the model itself or the recording may be wrong (as given it explains {}% of car_ax, added_mass on car is as "
+        "large as it may be, 343.8 kg): " + ADVICE + " (car 13.3 m/s)"
     )
-    held = ", added_mass on car is as large as it may be, 343.8 kg"  # where that was added, by the last digits
-    assert "".join(rest) in {f"% of car_ax{clause}): {ADVICE} (car 13.3 m/s)" for clause in ("", held)}
-    assert said[2] == ""
+    assert said[1] in {text.format(share) for share in (26, 27, 28)} and said[2] == ""
 
 
 def test_of_a_mass_that_looks_like_a_unit_it_is_said_that_it_may_be_the_mass(monkeypatch, capsys, tmp_path):
