@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
+from scipy.signal import TransferFunction, lsim
 
 from crash_estimator.core.derived_motion import smoothed, with_accelerations
 from crash_estimator.core.diagnosis import diagnose, predict
@@ -55,11 +56,15 @@ def recording(name: str, time: np.ndarray, **channels: tuple[str, np.ndarray]) -
     return Recording(Test(name, listed), np.rint(time * 1e9).astype(np.int64), values)
 
 
-def pushed_axis(friction: float) -> Recording:
-    """6 s at 1 kHz, to and fro; an encoder of 1 um steps."""
+def pushed_axis(friction: float, pulses: float = 0.0) -> Recording:
+    """6 s at 1 kHz, to and fro; an encoder of 1 um steps.
+
+    pulses: N that come twice a second for 50 ms, which a drive passes on with a ringing of its own at 25 Hz.
+    """
     fine, mass, damping = 1e-4, 40.0, 80.0
     time = np.arange(0.0, 6.0, fine)
     force = 45.0 * np.sin(2.0 * np.pi * 0.7 * time) + 20.0 * np.sin(2.0 * np.pi * 1.9 * time)
+    force += pulses * (np.mod(time, 0.5) > 0.45)
     x, v, shown = 0.0, 0.0, np.empty(len(time))
     for k, push in enumerate(force):
         shown[k] = x
@@ -68,6 +73,10 @@ def pushed_axis(friction: float) -> Recording:
         v = 0.0 if sticks else v + fine * (rest - friction * np.sign(v or rest)) / mass
         x += fine * v
     noise = np.random.default_rng(11).normal(0.0, 0.3, len(time) // 10)
+    if pulses:
+        own = 2.0 * np.pi * 25.0
+        drive = TransferFunction([1.0 / mass], [1.0, 0.2 * own, own**2])
+        shown += lsim(drive, pulses * (np.mod(time, 0.5) > 0.45), time)[1]
     measured = np.round(shown[::10] * 1e6) * 1e-6
     return recording("axis", time[::10], axis_x=("displacement", measured), motor_fx=("force", force[::10] + noise))
 
@@ -92,8 +101,10 @@ def shaken(cubic: float, acceleration: bool = False, until: float = 5.0, seed: i
     return recording("shaken", time, mass_x=shown, shaker_fx=("force", force))
 
 
-def test_dry_friction_of_an_axis_that_a_motor_pushes_is_named(model):
-    found = diagnose(model(AXIS), [pushed_axis(FRICTION)])
+@pytest.mark.parametrize("pulses", [0.0, 20.0])
+def test_dry_friction_of_an_axis_that_a_motor_pushes_is_named(model, pulses):
+    """Though of all that is sampled what its drive rings with after pulses is more of the misfit than friction."""
+    found = diagnose(model(AXIS), [pushed_axis(FRICTION, pulses)])
     assert found.verdict == "effect_missing", found.text
     first = found.steps[0]
     assert (first.effect, first.target) == ("coulomb_friction", "guide")
@@ -199,7 +210,7 @@ def test_a_derivative_follows_what_moves_and_leaves_the_noise():
     [
         ("axis_x", 0, "axis_x has no valid sample"),
         ("motor_fx", 0, "motor_fx has no valid sample"),
-        ("motor_fx", 14, "needs two valid samples"),  # means over some of them, of which the first is none
+        ("motor_fx", 5, "needs two valid samples"),  # means over some of them, of which the first is none
     ],
 )
 def test_a_channel_without_samples_is_one_line(model, channel, valid, said):

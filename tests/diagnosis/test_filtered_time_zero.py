@@ -119,5 +119,5 @@ def test_an_early_onset_is_not_taken_where_only_what_is_found_without_it_leaves_
     monkeypatch.setattr(search, "_may_begin_elsewhere", lambda self, path, elsewhere: False)
     monkeypatch.setattr(search, "_observed", lambda self, shifts=(): moved if shifts else stated)
     monkeypatch.setattr(search, "_selected", lambda self, records: paths[id(records)])
-    found = search(None, (), {}).begun()
+    found = search(SimpleNamespace(bodies=()), (), {}).begun()
     assert found == (Begun(paths[id(moved)], zero, ()) if taken else Begun(paths[id(stated)], None, (early,)))

@@ -38,15 +38,53 @@ def test_what_passes_a_filter_is_the_share_of_the_power_of_the_output_that_loses
     assert _kept(1e3 * both, PERIOD, 60) == pytest.approx(expected[1])
 
 
+def predicting(acceleration, until, pushed_by=None):
+    """A model of one body of 4 kg, sampled at 10 kHz."""
+    body = SimpleNamespace(mass=4.0, applied="push" if pushed_by is not None else None)
+    record = SimpleNamespace(
+        period=PERIOD,
+        time=np.array([0.0, until]),
+        at=np.arange(len(acceleration)),
+        signals={"push": SimpleNamespace(on_grid=pushed_by)},
+    )
+    layout = SimpleNamespace(
+        structure=SimpleNamespace(bodies=(body,)),
+        bodies=(body,),
+        outputs=(SimpleNamespace(body=0, quantity="acceleration"),),
+        weighed={},
+        terms=(),
+    )
+    residuals = SimpleNamespace(predicted=(acceleration[:, None],))
+    return SimpleNamespace(records=[record], residuals=residuals, fit=SimpleNamespace(layout=layout, theta=np.zeros(0)))
+
+
+def waves(slow, fast, share_of_fast, duration=0.4):
+    """Of a mean square of a half, at two frequencies in Hz."""
+    time = PERIOD * np.arange(round(duration / PERIOD))
+    parts = ((slow, 1.0 - share_of_fast), (fast, share_of_fast))
+    return sum(np.sqrt(share) * np.sin(2.0 * np.pi * frequency * time) for frequency, share in parts)
+
+
 @pytest.mark.parametrize(("above", "cfc"), [(0.037, 60), (0.07, 180)])
 def test_the_band_holds_all_but_a_twentieth_of_the_power_that_a_model_predicts(above, cfc):
     """An impactor that swings at 50 Hz has 2.3 to 3.7 % of its power above CFC 60; its case rings there."""
-    time = np.arange(4000) * 1e-4
-    swing = np.sqrt(1.0 - above) * np.sin(2.0 * np.pi * 20.0 * time) + np.sqrt(above) * np.sin(
-        2.0 * np.pi * 250.0 * time
-    )
-    residuals = SimpleNamespace(predicted=[swing[:, None]])
-    assert band_of([SimpleNamespace(period=1e-4)], residuals) == cfc
+    assert band_of(predicting(waves(20.0, 250.0, above), until=0.4)) == cfc
+
+
+@pytest.mark.parametrize(("frequency", "cfc", "band"), [(1.0, 2, "3.3 Hz"), (4.0, 6, "10 Hz"), (12.0, 20, "33 Hz")])
+def test_what_is_longer_than_a_crash_has_bands_of_its_own_below_those_of_crashes(frequency, cfc, band):
+    slow = waves(frequency, 200.0, 0.02, duration=4.0)
+    assert band_of(predicting(slow, until=4.0)) == cfc
+    assert band_of(predicting(slow, until=1.0)) == 60
+    assert Left(1.0, 0.0, 0.0, cfc, ()).band == band
+
+
+def test_the_band_is_of_what_the_model_gives_not_of_a_force_that_was_measured():
+    """Pulses of a motor are as fast as they are, whatever holds the axis back."""
+    held_back, pulses = waves(1.0, 20.0, 0.0, duration=4.0), 4.0 * waves(1.0, 50.0, 1.0, duration=4.0)
+    assert band_of(predicting(held_back + pulses / 4.0, until=4.0)) == 60
+    assert band_of(predicting(held_back + pulses / 4.0, until=4.0, pushed_by=pulses)) == 2
+    assert band_of(predicting(pulses / 4.0, until=4.0, pushed_by=pulses)) == 60, "its elements give nothing yet"
 
 
 def test_the_vibration_is_what_lies_above_the_band_that_was_compared():

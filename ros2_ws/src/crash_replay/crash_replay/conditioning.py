@@ -74,25 +74,32 @@ def cfc_coefficients(cfc: float, sample_period: float) -> tuple[np.ndarray, np.n
 
 
 def cfc_filter(values: np.ndarray, sample_period: float, cfc: int) -> np.ndarray:
-    """Values (n,) filtered forward and backward (no phase shift; -3 dB at 1.65 CFC), NaN where they were NaN.
+    """Values (n,) filtered as SAE J211-1 asks for a channel frequency class (`low_passed`).
 
-    Stretches between NaN are filtered each on its own, their ends extended by 10 ms of point reflection
-    against start-up transients. Raises RecordingError for a class that the standard has not got, or a
-    sample rate below ten times the class.
+    Raises RecordingError for a class that the standard has not got, or a sample rate below ten times the class.
     """
-    from scipy.signal import filtfilt  # it takes longer to import than all the rest: only who filters waits for it
-
     if cfc not in CFC_CLASSES:
         raise RecordingError(f"CFC must be one of {', '.join(map(str, CFC_CLASSES))}, got {cfc}")
     if not 0.0 < sample_period * cfc * RATE_PER_CFC <= 1.0 + STEADY:
         rate = f"{1.0 / sample_period:.6g} Hz" if sample_period > 0.0 else "none (one sample)"
         raise RecordingError(f"CFC {cfc} needs a sample rate of at least {RATE_PER_CFC * cfc} Hz, got {rate}")
+    return low_passed(values, sample_period, cfc)
+
+
+def low_passed(values: np.ndarray, sample_period: float, cfc: float) -> np.ndarray:
+    """Values (n,) filtered forward and backward (no phase shift; -3 dB at 1.65 cfc Hz), NaN where they were NaN.
+
+    Stretches between NaN are filtered each on its own, their ends extended against start-up transients by point
+    reflection, of 10 ms or, below CFC 60, of as many periods of the filter as that is there.
+    """
+    from scipy.signal import filtfilt  # it takes longer to import than all the rest: only who filters waits for it
+
     numerator, denominator = cfc_coefficients(cfc, sample_period)
     filtered = np.full(len(values), np.nan)
     valid = np.concatenate([[False], np.isfinite(values), [False]])
     edges = np.flatnonzero(valid[1:] != valid[:-1])
     for start, end in zip(edges[::2], edges[1::2], strict=False):
-        extension = min(end - start - 1, round(0.010 / sample_period))
+        extension = min(end - start - 1, round(0.010 * max(1.0, CFC_CLASSES[0] / cfc) / sample_period))
         filtered[start:end] = filtfilt(numerator, denominator, values[start:end], padlen=extension)
     return filtered
 

@@ -31,7 +31,7 @@ from models that lack what is to be found. The recordings do not come with the p
 in the band that the model speaks for, as given and with what was named; processor: seconds.
 
 All of these were looked at while the verdict's two numbers were chosen (three quarters of the misfit explained, less
-than 0.45 of the rest varying with time): they show what it says, and judge nothing. The two bodies dropped on water
+than half of the rest varying with time): they show what it says, and judge nothing. The two bodies dropped on water
 came later, and nothing was tuned on them; the force on their nose is that of the rigid test, without the water's mass
 that a nose on a spring moves along: least squares of the same two equations finds 5300 N/m for 8160, and 1020 for 1740.
 """

@@ -66,10 +66,12 @@ FELL, UNTIL = -0.05, 0.06
 
 def other_systems(folder: Path) -> Iterator:
     """Of what the folder has."""
-    axis, oscillator = folder / "emps" / "DATA_EMPS.mat", folder / "silverbox" / "SNLS80mV.csv"
-    if axis.exists():
-        truth = f"dry friction of {FRICTION} N, then a constant force"
-        yield Case("EMPS, an axis pushed by a motor, 24.8 s", lambda: [_axis(axis)], AXIS, truth, _is_friction)
+    oscillator = folder / "silverbox" / "SNLS80mV.csv"
+    for file, besides in (("DATA_EMPS.mat", ""), ("DATA_EMPS_PULSES.mat", " and by pulses")):
+        if (axis := folder / "emps" / file).exists():
+            truth = f"dry friction of {FRICTION} N, then a constant force"
+            read = partial(_axis, axis)
+            yield Case(f"EMPS, an axis pushed by a motor{besides}, 24.8 s", read, AXIS, truth, _is_friction)
     if oscillator.exists():
         tested = _oscillator(oscillator, TESTED)
         yield Case(
@@ -88,12 +90,12 @@ def other_systems(folder: Path) -> Iterator:
             )  # fmt: skip
 
 
-def _axis(path: Path) -> Recording:
+def _axis(path: Path) -> list[Recording]:
     data = loadmat(path)
     time = data["t"].ravel() - data["t"].ravel()[0]
     force = data["gtau"].item() * data["vir"].ravel()
     x = Channel("axis_x", "displacement"), data["qm"].ravel()
-    return _recording("emps", time, x, (Channel("motor_fx", "force"), force))
+    return [_recording("emps", time, x, (Channel("motor_fx", "force"), force))]
 
 
 def _oscillator(path: Path, samples: slice) -> Recording:

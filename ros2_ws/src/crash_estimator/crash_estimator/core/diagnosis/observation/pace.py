@@ -18,9 +18,15 @@ motion asks for, since the work would follow the duration else."""
 MOVES = 0.99
 """Share of the power of a body's acceleration below the frequency that a long record's step is chosen for ..."""
 
-PHASE, PHASE_IN_RESONANCE = 1e-2, 2e-3
-"""... so that the step's phase error there, (omega dt)^2 / 24, is this: the smaller one where a spring brings the body
-back, whose resonance would be at another frequency else."""
+PHASE = 2e-3
+"""... so that the step's phase error there, (omega dt)^2 / 24, is this, where a spring brings the body back: its
+resonance would be at another frequency else."""
+
+TURN = 1.0 / 60.0
+"""Change of a body's speed in a step, both RMS, where no spring brings it back: how fast a measured force is does not
+matter, as it is integrated as it is, but friction has to be seen to turn with the speed. The step of two recordings of
+one axis, with and without pulses of force, is 3 ms so; with 5 ms and more some parts of them tell its friction 6 to
+13 % too small, with 1 ms three times the time goes by for the same answer."""
 
 FEWEST_MEANS = 500
 """After the impact: as many as a crash of 0.1 s has at 5 kHz; a shorter recording is taken as it is sampled."""
@@ -32,10 +38,10 @@ def longest_step(structure: Structure, recording: Recording) -> float:
     names = [name for body in structure.bodies for name in body.acceleration]
     if duration <= LONG or not names:
         return LONGEST_STEP
-    fastest = max(_fastest(np.nan_to_num(recording.column(name)), recording.sample_period) for name in names)
     held = any(structure.is_held(k) for k, body in enumerate(structure.bodies) if body.free)
-    phase = PHASE_IN_RESONANCE if held else PHASE
-    return max(LONGEST_STEP, np.sqrt(24.0 * phase) / max(fastest, 1.0 / duration))
+    fastness, most = (_fastest, np.sqrt(24.0 * PHASE)) if held else (_turning, TURN)
+    fastest = max(fastness(np.nan_to_num(recording.column(name)), recording.sample_period) for name in names)
+    return max(LONGEST_STEP, most / max(fastest, 1.0 / duration))
 
 
 def at_its_own_pace(structure: Structure, recording: Recording) -> Recording:
@@ -63,3 +69,9 @@ def _fastest(acceleration: np.ndarray, period: float) -> float:
     power = np.cumsum(np.abs(np.fft.rfft(acceleration - acceleration.mean())) ** 2)
     at = int(np.searchsorted(power, MOVES * power[-1]))
     return 2.0 * np.pi * at / (len(acceleration) * period)
+
+
+def _turning(acceleration: np.ndarray, period: float) -> float:
+    """rad/s of the harmonic that has its ratio of acceleration to speed, RMS; a zero offset adds up to none."""
+    speed = period * np.cumsum(acceleration - acceleration.mean())
+    return float(acceleration.std() / max(speed.std(), np.finfo(float).tiny))

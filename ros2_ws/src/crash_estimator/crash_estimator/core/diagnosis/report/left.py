@@ -8,7 +8,7 @@ from ...rating import rate
 from ..observation.whitening import filtered
 from ..output_error.normal_equations import may_diverge
 from ..parameterization.layout import BEYOND_DOUBT, Layout
-from ..residuals.in_band import InBand, in_band, in_class, noise_in_class
+from ..residuals.in_band import SLOW_CLASSES, InBand, in_band, in_class, noise_in_class
 from ..residuals.residuals import rms
 from ..selection.fitted_model import Model
 
@@ -43,6 +43,8 @@ class Left(InBand):
 
     @property
     def band(self) -> str:
+        if self.cfc in SLOW_CLASSES:
+            return f"{self.cfc / 0.6:.2g} Hz"  # as CFC 60 passes what is below 100 Hz
         return f"CFC {self.cfc}" if self.cfc else "all sampled"
 
     def as_json(self) -> dict:

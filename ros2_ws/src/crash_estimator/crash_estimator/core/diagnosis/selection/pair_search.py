@@ -81,7 +81,7 @@ def likely(candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
 
 def _leading(model: Model, candidates: Sequence[CandidateFit]) -> list[CandidateFit]:
     """The likely ones that explain not too little to be one of two."""
-    band = band_of(model.records, model.residuals)
+    band = band_of(model)
     return [one for one in likely(candidates) if not explains_too_little(model, as_fitted(model, one), band)]
 
 

@@ -201,8 +201,7 @@ def sized_models(steps: Sequence[SelectionStep], final: Model) -> tuple[Model, .
 
 def band_of_steps(steps: Sequence[SelectionStep]) -> int | None:
     """The class in which the models' errors are told and compared: that of the model as given."""
-    given = steps[0].before
-    return band_of(given.records, given.residuals)
+    return band_of(steps[0].before)
 
 
 def fit_of_all(steps: Sequence[SelectionStep], final: Model) -> Fit:
