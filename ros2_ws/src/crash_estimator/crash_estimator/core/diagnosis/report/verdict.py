@@ -12,6 +12,9 @@ from .tolerance import Tolerance
 
 EFFECT_MISSING, ADEQUATE, UNEXPLAINED = "effect_missing", "adequate", "unexplained"
 
+CURVE = "two functions of one crush are a curve that follows anything"
+"""Said where no share of the misfit is enough."""
+
 
 class Evidence(NamedTuple):
     """What a verdict is given on."""
@@ -54,8 +57,7 @@ def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
         too_many = evidence.added > THRESHOLDS.most_at_once
         return Verdict(UNEXPLAINED if too_many or evidence.varying else word, True)
     within = tolerance.admits(evidence.after)
-    still = _stands_still(evidence) or _leaves_next_to_nothing(evidence, within)
-    if _explains(evidence) and still and not evidence.varying and (within or _beats_its_rivals(evidence)):
+    if evidence.added and not (evidence.varying or doubt_of(evidence, within)):
         return Verdict(EFFECT_MISSING, within)
     nothing_to_add = not (evidence.added or evidence.white) and _stands_still(evidence)
     doubted = any(one.evidence > THRESHOLDS.gain_beyond_white for one in evidence.ranking)
@@ -82,25 +84,38 @@ def _leaves_next_to_nothing(evidence: Evidence, within: bool) -> bool:
     )
 
 
-def _explains(evidence: Evidence) -> bool:
-    """In the sensors' noise the evidence of what leaves more than that knows no doubt: it has to be weighed first."""
-    return (
-        0 < evidence.added <= THRESHOLDS.most_at_once
-        and (evidence.weighed or evidence.white)
-        and evidence.certain
-        and evidence.after.share_explained(evidence.before) > evidence.needed
-    )
+def doubt_of(evidence: Evidence, within: bool) -> str:
+    """What stands against naming what was found where it leaves more than noise, in words; empty: nothing does.
+
+    In the sensors' noise the evidence of what leaves more than that knows no doubt: it has to be weighed first.
+    within: what is left is within the tolerance.
+    """
+    share = evidence.after.share_explained(evidence.before)
+    if evidence.added > THRESHOLDS.most_at_once:
+        return f"more than {THRESHOLDS.most_at_once} effects are likelier one of another kind"
+    if not evidence.certain:
+        return "a coefficient is within its standard deviation, or as large as it can be"
+    if share <= evidence.needed:
+        return f"{evidence.needed:.0%} is asked for" if evidence.needed < 1.0 else CURVE
+    if not (evidence.weighed or evidence.white):
+        return "the evidence was not weighed against what is left"
+    if not (_stands_still(evidence) or _leaves_next_to_nothing(evidence, within)):
+        return "most of what is left varies with time"
+    rivals = [] if within else _unbeaten(evidence)
+    return f"{rivals[0].effect} on {rivals[0].target} may do so as well" if rivals else ""
 
 
-def _beats_its_rivals(evidence: Evidence) -> bool:
-    """The first candidate does, by evidence, all that were fitted but the same effect elsewhere and other laws of the
-    same place: what is missing is sure then, or where; these rivals are named. Where what is left is no noise, none of
-    them may explain nearly as much and leave hardly more, either: evidence grows with what all of them explain, and
-    says no more of which it is."""
+def _unbeaten(evidence: Evidence) -> list[Ranked]:
+    """Candidates that the first one does not beat by evidence; of all that were fitted but the same effect elsewhere
+    and other laws of the same place: what is missing is sure then, or where; these rivals are named. Where what is left
+    is no noise, none may explain nearly as much and leave hardly more, either: evidence grows with what all of them
+    explain, and says no more of which it is."""
     (first, *others), place_of = evidence.ranking, evidence.place_of
     elsewhere = [r for r in others if r.fitted and place_of(r.target) != place_of(first.target)]
     unlike = [r for r in elsewhere if r.effect != first.effect]
-    as_much = [r for r in unlike if r.evidence > THRESHOLDS.nearly_all * first.evidence]
-    if not evidence.white and any(r.left < (1.0 + THRESHOLDS.half) * first.left for r in as_much):
-        return False
-    return all(first.evidence > r.evidence + THRESHOLDS.confounded for r in unlike)
+
+    def as_much(rival: Ranked) -> bool:
+        hardly_more = rival.left < (1.0 + THRESHOLDS.half) * first.left
+        return not evidence.white and rival.evidence > THRESHOLDS.nearly_all * first.evidence and hardly_more
+
+    return [r for r in unlike if first.evidence <= r.evidence + THRESHOLDS.confounded or as_much(r)]

@@ -13,7 +13,7 @@ from .left import Left, vibration_of
 from .ranking import StepReport
 from .time_zero_step import TIME_ZERO, signals_begin
 from .tolerance import Tolerance, percent
-from .verdict import ADEQUATE, EFFECT_MISSING, Evidence, Verdict
+from .verdict import ADEQUATE, EFFECT_MISSING, Evidence, Verdict, doubt_of
 
 LASTING = {SPRINGS: "elastic forces that act on", ALL: "all forces that act on, dampers' too,"}
 """By `acts_when_spent`."""
@@ -30,7 +30,7 @@ def verdict_text(
     elif verdict.word == EFFECT_MISSING:
         said = f"effect missing: {_missing(evidence, tolerance, steps, first, final, floor)}"
     else:
-        said = f"unexplained: {_unexplained(evidence, steps, first, final, floor)}"
+        said = f"unexplained: {_unexplained(evidence, tolerance, steps, first, final, floor)}"
     below = final.records[0].below
     if below < float("inf"):
         said += f"; what rings above {below:g} Hz, {vibration_of(final) / G:.3g} g, is left out"
@@ -86,10 +86,9 @@ def _missing(evidence: Evidence, tolerance: Tolerance, steps, first: Model, fina
         small = first.residuals.rms < THRESHOLDS.near_floor**0.5 * floor
         why = f"; small, yet noise would not leave it ({steps[0].evidence:.0f} nats of evidence)" if small else ""
         return f"{_names(steps)}; {_size(first, final, floor)}, now white{_in_the_band(final)}{why}{advice}"
-    share = evidence.after.share_explained(evidence.before)
     within = tolerance.admits(evidence.after)
     grade = f"is within {tolerance.text}" if within else f"is more than {tolerance.text}, and is no noise: incomplete"
-    explains = f"{'it explains' if len(steps) == 1 else 'they explain'} {share:.0%} of the misfit"
+    explains = f"{'it' if len(steps) == 1 else 'they'} {_explained(steps, evidence)}"
     return f"{_names(steps)}; {explains}, {_fall(evidence)}; {_what_is_left(evidence.after)}, {grade}{advice}"
 
 
@@ -99,7 +98,7 @@ def _in_the_band(model: Model) -> str:
     return f" below {passed:.0f} Hz, up to where the sensors' filters show it" if passed < float("inf") else ""
 
 
-def _unexplained(evidence: Evidence, steps, first: Model, final: Model, floor: float) -> str:
+def _unexplained(evidence: Evidence, tolerance: Tolerance, steps, first: Model, final: Model, floor: float) -> str:
     names, size, drift, varying = _names(steps), _size(first, final, floor), evidence.drift, evidence.varying
     if varying:
         better = f"{names}: no better than" if names else "no candidate explains what is left as well as"
@@ -110,13 +109,13 @@ def _unexplained(evidence: Evidence, steps, first: Model, final: Model, floor: f
     if evidence.white:
         given = f"with {names} it looks white" if steps else "it looks white"
         return f"{given}; {size}; yet what is left goes along with {along}"
-    worst = final.residuals.band_test.worst
+    worst, within = final.residuals.band_test.worst, tolerance.admits(evidence.after)
     layout = final.fit.layout
     where = (
         f"{layout.outputs[worst.output].channel} of {final.records[worst.record].test.id}, "
         f"{worst.low:.0f} to {worst.high:.0f} Hz"
     )
-    done = f"{names} {'explains' if len(steps) == 1 else 'explain'} part of it; " if steps else ""
+    done = f"{names} {_explained(steps, evidence)}, but {doubt_of(evidence, within)}; " if steps else ""
     left = f"no candidate explains what is left, most of it in {where}"
     varies = drift.share > THRESHOLDS.some and not drift.constant
     also = f"; {drift.share:.0%} of it goes along with {along}" if varies else ""
@@ -125,6 +124,11 @@ def _unexplained(evidence: Evidence, steps, first: Model, final: Model, floor: f
 
 def _names(steps: Sequence[StepReport]) -> str:
     return ", ".join(step.name for step in steps)
+
+
+def _explained(steps: Sequence[StepReport], evidence: Evidence) -> str:
+    share = evidence.after.share_explained(evidence.before)
+    return f"{'explains' if len(steps) == 1 else 'explain'} {share:.0%} of the misfit"
 
 
 def _size(first: Model, final: Model, floor: float) -> str:
