@@ -42,7 +42,9 @@ SHAKES = 0.00125
 filtered with CFC 60, its barrier 0.34 %."""
 BACK, AHEAD = 0.004, 0.0015
 """s before and after the alarm in which the change point is sought and fitted; of a longer run two runs and one, where
-that is more: not varied."""
+that is more. Of 111 looked-at simulated recordings whose stated time zero is right 20 are told to begin more than two
+samples before it and 2 more than 1 ms after; 14 and 4 with half of the first, 22 and none with twice as much, 25 and 2
+with half of the second, 15 and 2 with twice as much."""
 EARLIER = 0.002
 """s before the shortest run's alarm by which a longer one must have ended to be believed instead: what is nearer the
 shortest one's change point is sought in anyway. With none the wobble of NHTSA 10146's load cells moved its onset from

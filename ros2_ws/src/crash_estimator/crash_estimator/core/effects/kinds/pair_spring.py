@@ -15,7 +15,7 @@ from .element_force import HALF
 REACHED = (0.1, 0.25, 0.5, 0.7, 0.85)
 """Shares of how much closer than at time zero two bodies come, from which a gap is searched for: of an engine that is
 0.3 m from the barrier a fit from 0.55 of that way on ends at the gap, and one from 0.28 of it far from it. The two
-small ones are for what is reached at once; how many there are was not varied."""
+small ones are for what is reached at once. With three of them, and with ten, 23 looked-at cases were told the same."""
 
 
 @dataclass(frozen=True)
