@@ -3,6 +3,8 @@
 The truth is simulated here: friction that sticks (Karnopp), in small steps, and an oscillator by scipy's integrator.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -20,6 +22,8 @@ from crash_estimator.core.diagnosis.output_error.normal_equations import whitene
 from crash_estimator.core.diagnosis.output_error.problem import make_problem
 from crash_estimator.core.diagnosis.output_error.simulation import simulate
 from crash_estimator.core.diagnosis.parameterization.magnitudes import measure_magnitudes
+from crash_estimator.core.diagnosis.selection import onset_search
+from crash_estimator.core.diagnosis.selection.time_zero import Shift
 from crash_estimator.core.fold import run
 from crash_estimator.core.free_run import free_run
 from crash_estimator.core.kinematics import Kinematics
@@ -109,6 +113,17 @@ def test_dry_friction_of_an_axis_that_a_motor_pushes_is_named(model, pulses):
     first = found.steps[0]
     assert (first.effect, first.target) == ("coulomb_friction", "guide")
     assert first.coefficient == pytest.approx(FRICTION, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("thrown", "sought"), [("{mass: 40.0, acceleration: block_ax}", True), ("{fixed: true}", False)]
+)
+def test_no_onset_is_sought_where_measured_forces_push_all_free_bodies(model, monkeypatch, thrown, sought):
+    structure = model(AXIS.replace("  frame:", f"  block: {thrown}\n  frame:"))
+    onset = Shift(0, "axis", 5e-3, 1e-4, 1e-4)
+    monkeypatch.setattr(onset_search, "onsets", lambda recordings: (onset,))
+    monkeypatch.setattr(onset_search._Search, "as_stated", [SimpleNamespace(seen_early=0.0)])
+    assert onset_search._Search(structure, (), {}).begins == ((onset,) if sought else ())
 
 
 def test_without_friction_none_is_named(model):

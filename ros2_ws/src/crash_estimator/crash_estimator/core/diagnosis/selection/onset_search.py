@@ -130,9 +130,10 @@ class _Search:
 
     @cached_property
     def begins(self) -> tuple[Shift, ...]:
-        """Onsets of the recordings that rest before them, wherever these are; none where a measured force pushes a
-        free body, which says itself when."""
-        if any(body.applied for body in self.structure.bodies):
+        """Onsets of the recordings that rest before them, wherever these are; none where measured forces push all free
+        bodies, which say themselves when."""
+        free = [body for body in self.structure.bodies if body.free]
+        if free and all(body.applied for body in free):
             return ()
         return tuple(one._replace(early=self.as_stated[one.recording].seen_early) for one in onsets(self.recordings))
 
