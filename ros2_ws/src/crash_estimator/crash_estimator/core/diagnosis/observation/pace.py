@@ -16,11 +16,12 @@ LONG = 1.0
 motion asks for, since the work would follow the duration else."""
 
 MOVES = 0.99
-"""Share of the power of a body's acceleration below the frequency that a long record's step is chosen for ..."""
+"""Share of the power of a body's acceleration below the frequency that a long record's step is chosen for ... Ours: of
+a shaken oscillator (Silverbox) 0.98 and 0.995 tell the same effects, the cubic one as 3.928 and 3.924 N/m^3."""
 
 PHASE = 2e-3
 """... so that the step's phase error there, (omega dt)^2 / 24, is this, where a spring brings the body back: its
-resonance would be at another frequency else."""
+resonance would be at another frequency else. Ours: halved and doubled, 3.919 and 3.933 of that oscillator."""
 
 TURN = 1.0 / 60.0
 """Change of a body's speed in a step, both RMS, where no spring brings it back: how fast a measured force is does not

@@ -96,7 +96,7 @@ def doubt_of(evidence: Evidence, within: bool) -> str:
     if not evidence.certain:
         return "a coefficient is within its standard deviation, or as large as it can be"
     if share <= evidence.needed:
-        return f"{evidence.needed:.0%} is asked for" if evidence.needed < 1.0 else CURVE
+        return f"more than {evidence.needed:.0%} is asked for" if evidence.needed < 1.0 else CURVE
     if not (evidence.weighed or evidence.white):
         return "the evidence was not weighed against what is left"
     if not (_stands_still(evidence) or _leaves_next_to_nothing(evidence, within)):
