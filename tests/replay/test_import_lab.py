@@ -84,6 +84,25 @@ def test_a_car_whose_sensors_contradict_each_other_bears_no_witness(tmp_path):
     assert not any(note.startswith("outlier") for note in recording.test.notes)
 
 
+@pytest.mark.parametrize(("shares", "left_out"), [
+    ((0.7, 0.95, 1.25, 1.4), 0), ((1.0, 0.7, 1.0, 1.4), 0), ((1.0, 1.0, 1.0, 1.4), 1),
+])  # fmt: skip
+def test_none_is_an_outlier_where_not_most_of_a_car_s_sensors_agree(tmp_path, shares, left_out):
+    """As in NHTSA 7292, an offset collision in which both cars turn: each sensor is more than a tenth off the median."""
+    numbers = dict(zip(("4", "6", "7", "8"), shares))
+    records = [(record, values) for record, values in two_cars() if record.split("|")[1] != "5"]
+    records = [(record, values * numbers.get(record.split("|")[1], 1.0)) for record, values in records]
+    recording = read_source(write_two_cars(tmp_path / "turning", records=records))
+    said = [note for note in recording.test.notes if note.startswith("vehicle1_car: ")]
+    outliers = [note for note in recording.test.notes if note.startswith("outlier")]
+    assert len(outliers) == left_out and len(said) == (not left_out)
+    assert all("4 sensors contradict each other, which are right is not known" in note for note in said)
+    names = ["vehicle1_left_sill_ax", "vehicle1_right_sill_ax", "vehicle1_floor_right_rear_ax", "vehicle1_left_toepan_ax"]
+    assert sum(name in recording.test.channel_names for name in names) == len(names) - left_out
+    mean = np.mean([recording.column(name) for name in names[:3]], axis=0)
+    assert_allclose(recording.column("vehicle1_car_ax"), mean, rtol=1e-6, atol=1e-6)
+
+
 def test_signs_and_vehicles_that_face_each_other(folder, cars, tmp_path):
     names = tmp_path / "names.yaml"
     names.write_text(

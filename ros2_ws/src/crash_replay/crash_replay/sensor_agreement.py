@@ -6,7 +6,8 @@ instant:
 
     deviation_i = max |v_i - median(v)| / max |median(v)|
 
-A sensor beyond TOLERANCE contradicts the others. With two sensors the median cannot tell which is wrong: then the
+A sensor beyond TOLERANCE contradicts the others, where most of them agree: those of a car that turns while it crashes
+may each tell another motion, and none is wrong. With two sensors the median cannot tell which is wrong: then the
 momentum does, where the other side's is known (the force on the barrier, the other vehicle), or nobody can.
 """
 
@@ -33,7 +34,7 @@ class Agreement(NamedTuple):
     change: np.ndarray  # (sensors,) m/s, change of velocity until the end of the comparison
     deviation: np.ndarray  # (sensors,) share of the body's change of velocity
     outliers: tuple[int, ...]
-    undecided: bool = False  # two that contradict each other, and nothing that says which is right
+    undecided: bool = False  # they contradict each other, and nothing says which are right
 
 
 def agreement(time: np.ndarray, columns: Sequence[np.ndarray], momentum: float | None = None) -> Agreement:
@@ -51,7 +52,9 @@ def agreement(time: np.ndarray, columns: Sequence[np.ndarray], momentum: float |
     if len(columns) < 2:
         return Agreement(change, deviation, ())
     if len(columns) > 2:
-        return Agreement(change, deviation, tuple(np.flatnonzero(deviation > TOLERANCE).tolist()))
+        off = tuple(np.flatnonzero(deviation > TOLERANCE).tolist())
+        most_agree = 2 * len(off) < len(columns)
+        return Agreement(change, deviation, off if most_agree else (), undecided=not most_agree)
     apart = np.abs(velocity[0] - velocity[1]).max() / max(np.abs(velocity).max(), AT_REST)
     if apart <= TOLERANCE:
         return Agreement(change, deviation, ())

@@ -86,7 +86,7 @@ def _by_momentum(
     masses: Mapping[str, float],
     pushed: float | None,
 ) -> dict[str, Agreement]:
-    """Again, of bodies whose two sensors contradict each other, with the momentum of what they ran into."""
+    """Again, of bodies whose sensors contradict each other, with the momentum of what they ran into."""
     again = {}
     for body, found in compared.items():
         others = [other for other in compared if other != body and not compared[other].undecided]
@@ -101,12 +101,13 @@ def _by_momentum(
 
 
 def _said(members: Sequence[Sensor], found: Agreement) -> list[str]:
-    """A line for each sensor that contradicts the others, and one for two of which nobody knows which is right."""
+    """A line for each sensor that contradicts the others, or one for all where nobody knows which are right."""
     change = [f"{member.channel.name} {3.6 * dv:.1f} km/h" for member, dv in zip(members, found.change)]
     sound = [3.6 * dv for k, dv in enumerate(found.change) if k not in found.outliers]
     if found.undecided:
-        return [f"{members[0].channel.body}: two sensors contradict each other, which is right is not known: change of "
-                f"velocity {', '.join(change)}; leave one out with --names or --channels"]  # fmt: skip
+        count, which = ("two", "which is") if len(members) == 2 else (f"most of its {len(members)}", "which are")
+        return [f"{members[0].channel.body}: {count} sensors contradict each other, {which} right is not known: change "
+                f"of velocity {', '.join(change)}; leave out what is wrong with --names or --channels"]  # fmt: skip
     return [
         f"outlier {members[k].channel.name}: its velocity is up to {found.deviation[k]:.0%} off the other sensors of "
         f"{members[k].channel.body} (change {3.6 * found.change[k]:.1f} km/h, theirs {min(sound):.1f} to "
