@@ -64,6 +64,16 @@ def test_momentum_balances(cars, folder):
     assert_allclose(momentum[0], momentum[1], rtol=0.05)
 
 
+@pytest.mark.parametrize("said", ["64.6 ms", "64.6 MILLISECONDS", "64.6 MILLSECONDS", "64.6 msec"])
+def test_what_the_header_calls_not_valid_is_left_out_however_it_writes_the_unit(tmp_path, said):
+    records = two_cars()
+    record, values = records[13]
+    records[13] = record.replace("AM|P|NO COMMENTS", f"QD|P|NO VALID DATA AFTER {said}"), values
+    recording = read_source(write_two_cars(tmp_path / "foot", records=records))
+    valid = np.isfinite(recording.column("vehicle2_passenger_chest_dx"))
+    assert 0.064 < recording.time[valid].max() < 0.0646 and valid[recording.time < 0.064].all()
+
+
 def test_of_two_sensors_the_momentum_tells_which_is_wrong(tmp_path):
     records = [r for r in two_cars() if r[0].split("|")[1] in ("5", "7", "10", "11", "12")]
     recording = read_source(write_two_cars(tmp_path / "two", records=records))
@@ -88,7 +98,7 @@ def test_a_car_whose_sensors_contradict_each_other_bears_no_witness(tmp_path):
     ((0.7, 0.95, 1.25, 1.4), 0), ((1.0, 0.7, 1.0, 1.4), 0), ((1.0, 1.0, 1.0, 1.4), 1),
 ])  # fmt: skip
 def test_none_is_an_outlier_where_not_most_of_a_car_s_sensors_agree(tmp_path, shares, left_out):
-    """As in NHTSA 7292, an offset collision in which both cars turn: each sensor is more than a tenth off the median."""
+    """As in NHTSA 7292, where both cars turn: each sensor is more than a tenth off the median."""
     numbers = dict(zip(("4", "6", "7", "8"), shares))
     records = [(record, values) for record, values in two_cars() if record.split("|")[1] != "5"]
     records = [(record, values * numbers.get(record.split("|")[1], 1.0)) for record, values in records]
@@ -97,7 +107,12 @@ def test_none_is_an_outlier_where_not_most_of_a_car_s_sensors_agree(tmp_path, sh
     outliers = [note for note in recording.test.notes if note.startswith("outlier")]
     assert len(outliers) == left_out and len(said) == (not left_out)
     assert all("4 sensors contradict each other, which are right is not known" in note for note in said)
-    names = ["vehicle1_left_sill_ax", "vehicle1_right_sill_ax", "vehicle1_floor_right_rear_ax", "vehicle1_left_toepan_ax"]
+    names = [
+        "vehicle1_left_sill_ax",
+        "vehicle1_right_sill_ax",
+        "vehicle1_floor_right_rear_ax",
+        "vehicle1_left_toepan_ax",
+    ]
     assert sum(name in recording.test.channel_names for name in names) == len(names) - left_out
     mean = np.mean([recording.column(name) for name in names[:3]], axis=0)
     assert_allclose(recording.column("vehicle1_car_ax"), mean, rtol=1e-6, atol=1e-6)

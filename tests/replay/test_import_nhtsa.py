@@ -39,6 +39,15 @@ def curve(comment, sensor="AC", occupant="NA", location="XXXX", axis="XG", unit=
         (curve("DRIVER LEFT FOOT Z - FRONT", occupant="01", axis="ZL"), "driver_left_foot_front_az"),
         (curve("BARRIER K-01 Fx", "LC", location="LC1101", unit="NWT", vehicle=0), "barrier_k01_fx"),
         (curve("BOTTOM OF ENGINE X: No valid data after 67ms"), "engine_bottom_ax"),
+        (
+            curve("NO VALID DATA AFTER 64.6 MILLISECONDS", location="FOTL", occupant="01", axis="YL"),
+            "driver_left_foot_ay",
+        ),
+        (
+            curve("EXCEEDED FULL SCALE AT 61.4 MILLSECONDS, QUESTIONABLE DATA THEREAFTER", location="VECG"),
+            "cg_ax",
+        ),
+        (curve("RIGHT SILL X; QUES. DATA PER VRTC'S INSTRUCTIONS", location="OTHR"), "right_sill_ax"),
         (curve("", location="VECG", axis="NA"), "cg_a"),
         (curve("3RD ROW X"), "xxxx_3rd_row_ax"),
         (curve("ACCEL. LOCATION #1, NO COMMENTS", location="DSRF", axis="YG"), "right_front_sill_ay"),

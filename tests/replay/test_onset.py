@@ -92,6 +92,26 @@ def test_a_rise_that_takes_its_time_to_get_out_of_the_noise(rise, noise, median_
     assert np.median(late) < median_ms and late.max() < 8.0 and sum(one.differs for one in found) <= 6
 
 
+def test_dummies_that_sway_on_the_way_are_no_impact():
+    """As in NHTSA 10146 with all of its channels: a neck's and a leg's, of 120, leave their rest 40 ms before it."""
+    time = np.arange(-600, 1000) * 1e-4
+    impact, swaying = np.clip(time / 0.1, 0.0, 1.0), np.clip((time + 0.04) / 0.01, 0.0, 1.0)
+    clean = np.array([300.0 * np.sin(np.pi * impact), 200.0 * swaying, 150.0 * swaying]).T
+    values = clean + np.random.default_rng(3).normal(size=clean.shape)
+    channels = (
+        Channel("car_ax", "acceleration", body="car"), Channel("driver_neck_fy", "force", body="driver_neck"),
+        Channel("passenger_left_tibia_fz", "force", body="passenger_left_tibia"),
+    )  # fmt: skip
+    recording = Recording(Test("T", channels), np.round(time * 1e9).astype(np.int64), values)
+    assert onset_note(recording) == ""
+    found = at_onset(shifted(recording, 5.0))
+    assert (
+        np.abs(found.time_ns - recording.time_ns).max() <= 500_000 and "to the onset (car_ax)" in found.test.notes[-1]
+    )
+    dummies = Recording(Test("T", channels[1:]), recording.time_ns, values[:, 1:])
+    assert "signals begin -40 ms" in onset_note(dummies)
+
+
 def test_import_finds_it_and_says_so(tmp_path, capsys):
     late = shifted(read_bag(BAGS / "frontal_single.mcap"), 3.0)
     write_bag(late, tmp_path / "late.mcap")

@@ -28,6 +28,7 @@ def _row(words: str, quantities: str, cfc: int, what: str) -> _Row:
     return _Row(rf"(^|_)({words})(_|\d|$)", tuple(quantities.split()), ChannelClass(cfc, what))
 
 
+BARRIER = ChannelClass(60, "barrier force")
 LEG = "femur|knee|tibia|ankle|leg"
 ROWS = (
     _row("head", "acceleration angular_velocity", 1000, "head acceleration"),
@@ -41,7 +42,7 @@ ROWS = (
     _row(LEG, "force moment", 600, "leg load"),
     _row(LEG, "displacement", 180, "leg displacement"),
     _row("belt|lap_belt|shoulder_belt", "force", 60, "belt force"),
-    _row("barrier|mdb", "force moment", 60, "barrier force"),
+    _row("barrier|mdb", "force moment", BARRIER.cfc, BARRIER.what),
     _row("steering_column|steering_wheel", "force moment", 600, "steering column load"),
 )
 PART_OF_A_VEHICLE = re.compile(
@@ -63,6 +64,11 @@ def class_of(channel: Channel) -> ChannelClass:
         if channel.quantity in row.quantities and re.search(row.words, said):
             return row.found
     return OTHER_OF_A_DUMMY if DUMMY.search(said) and not PART_OF_A_VEHICLE.search(said) else VEHICLE
+
+
+def takes_part_in_the_impact(channel: Channel) -> bool:
+    """It is of a vehicle's structure or of the barrier: no dummy's, no belt's, whose load follows."""
+    return class_of(channel) in (VEHICLE, BARRIER)
 
 
 def frequency_class(text: str) -> int | str:

@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .channel_class import takes_part_in_the_impact
 from .conditioning import RESTS_AT_ZERO
 from .recording import Recording, RecordingError
 
@@ -186,12 +187,25 @@ def _change_costs(columns: np.ndarray, candidates: np.ndarray, end: int) -> np.n
     return costs
 
 
+def onset_of_the_impact(recording: Recording) -> Onset | None:
+    """`find_onset` of the vehicle's and the barrier's channels, or of all where those show none: a dummy is shaken and
+    sways on the way to the barrier, and of many channels some do so at the same time."""
+    channels = recording.test.channels
+    chosen = [k for k, channel in enumerate(channels) if takes_part_in_the_impact(channel)]
+    if chosen and len(chosen) < len(channels):
+        test = replace(recording.test, channels=tuple(channels[k] for k in chosen))
+        onset = find_onset(Recording(test, recording.time_ns, recording.values[:, chosen]))
+        if onset:
+            return onset
+    return find_onset(recording)
+
+
 def at_onset(recording: Recording) -> Recording:
     """The recording with its time zero at the onset; the notes say by how much it has moved.
 
     Raises RecordingError where there is no onset to be found.
     """
-    onset = find_onset(recording)
+    onset = onset_of_the_impact(recording)
     if onset is None:
         raise RecordingError(
             f"test {recording.test.id}: no onset found: no acceleration or force is at rest in the first "
@@ -217,7 +231,7 @@ def moved_time_zero(recording: Recording, by_ns: int, why: str) -> Recording:
 
 def onset_note(recording: Recording) -> str:
     """A line where the signals begin elsewhere than at the stated time zero, and what to do; "" else."""
-    onset = find_onset(recording)
+    onset = onset_of_the_impact(recording)
     if onset is None or not onset.differs:
         return ""
     return (

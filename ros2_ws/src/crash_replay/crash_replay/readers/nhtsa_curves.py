@@ -16,7 +16,8 @@ from .ev5 import Curve, Header
 from .nhtsa_names import axis_of, body_of, channel_names
 from .units import quantity_of, si_factor
 
-VALID_UNTIL = re.compile(r"no valid data after (\d+(?:\.\d+)?) *ms", re.IGNORECASE)
+VALID_UNTIL = re.compile(r"no valid data after (\d+(?:\.\d+)?) *m(?:s|(?:illi?)?-?sec)", re.IGNORECASE)
+"""In ms; one laboratory writes MILLISECONDS, and MILLSECONDS."""
 ON_GRID = 0.01
 """Share of the sample period by which a file's times may be off the header's."""
 

@@ -33,8 +33,10 @@ NOTHING = re.compile(r"(NO|NONE|NOT|N/?A|UNKNOWN)?\W*(COMMENTS?|COMMENTARY|APPLI
 """A comment that says nothing: NO COMMENTS, NONE, N/A."""
 NOR_DOES = re.compile(
     r"ACCEL(EROMETER)?\.? LOCATION *#? *\d+|\b(NO|NOT) (COMMENTS?|APPLICABLE)|(CURVE|CHANNEL) *#? *\d+\b"
+    r"|[^;,]*\b(DATA|FULL SCALE)\b[^;,]*"
 )
-"""Parts of a comment that name no place: ACCEL. LOCATION #1, NO COMMENTS stands in the headers of side impacts."""
+"""Parts of a comment that name no place: ACCEL. LOCATION #1, NO COMMENTS stands in the headers of side impacts; and
+what is said of the data, as EXCEEDED FULL SCALE AT 61.4 MS, QUESTIONABLE DATA THEREAFTER."""
 SAID_BY_CODES = re.compile(
     r"\b([FMA]?[XYZ]R?|RED|REDUNDANT|PRIMARY|ACCELERATION|ANGULAR|VELOCITY|DISPLACEMENT|DEFLECTION"
     r"|FORCE|MOMENT|LOAD|CELL)\b"
