@@ -1,14 +1,19 @@
 """Where a recording is taken from, and where it is asked when bodies touch: each decision of the search by itself."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers_paths import BAGS
 
 from crash_estimator.core.diagnosis import THRESHOLDS
+from crash_estimator.core.diagnosis.observation.rest import quiet_of
 from crash_estimator.core.diagnosis.selection import onset_search
 from crash_estimator.core.diagnosis.selection.onset_search import Begun
-from crash_estimator.core.diagnosis.selection.time_zero import Shift, TimeZero
+from crash_estimator.core.diagnosis.selection.time_zero import Shift, TimeZero, onsets
+from crash_replay.bag import read_bag
+from crash_replay.recording import Channel, Recording
 
 
 def path(added=0, noise=False, mean_square=1.5, distorts=""):
@@ -150,3 +155,18 @@ def test_what_moves_before_an_onset_is_not_left_out(monkeypatch, moves, rests):
     later = [Shift(0, "test", 1e-2, 1e-4, 1e-4)]
     assert onset_search._Search(None, (), {})._rest_until(later) == rests
     assert onset_search._Search(None, (), {})._rest_until([later[0]._replace(seconds=-1e-3)])
+
+
+def test_sensors_rest_until_the_impact_though_dummies_sway_before_it():
+    """NHTSA 10146 with all its channels had 5 ms of rest of 51, and its engine was not named."""
+    plain = read_bag(BAGS / "frontal_engine_cab.mcap")
+    sways = 200.0 * np.clip((plain.time - 0.6 * plain.time[0]) / 0.005, 0.0, 1.0)
+    noise = np.random.default_rng(4).normal(size=(len(plain), 2))
+    dummies = (
+        Channel("driver_neck_fy", "force", body="driver_neck"),
+        Channel("passenger_left_tibia_fz", "force", body="passenger_left_tibia"),
+    )
+    test = replace(plain.test, channels=(*plain.test.channels, *dummies))
+    recording = Recording(test, plain.time_ns, np.column_stack([plain.values, sways[:, None] + noise]))
+    assert quiet_of(recording).ends == quiet_of(plain).ends
+    assert onsets([recording]) == onsets([plain])

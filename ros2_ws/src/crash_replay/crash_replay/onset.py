@@ -87,7 +87,20 @@ class _Alarm(NamedTuple):
 
 
 def find_onset(recording: Recording) -> Onset | None:
-    """The instant at which the impact begins; None where nothing rests at first, or nothing wakes."""
+    """The instant at which the impact begins; None where nothing rests at first, or nothing wakes.
+
+    Of the vehicle's and the barrier's channels, where none of them is among those that have woken first: a dummy is
+    shaken and sways on the way to the barrier, and of a hundred channels some do so at the same time.
+    """
+    onset, channels = _onset_of_any(recording), recording.test.channels
+    impact = [k for k, channel in enumerate(channels) if takes_part_in_the_impact(channel)]
+    if onset is None or not impact or {channels[k].name for k in impact} & set(onset.channels):
+        return onset
+    test = replace(recording.test, channels=tuple(channels[k] for k in impact))
+    return _onset_of_any(Recording(test, recording.time_ns, recording.values[:, impact])) or onset
+
+
+def _onset_of_any(recording: Recording) -> Onset | None:
     period = recording.sample_period
     quiet = max(LEAST_AT_REST, round(AT_REST / period)) if period else 0
     if not quiet or len(recording) < 2 * quiet + LEAST_AHEAD:
@@ -187,25 +200,12 @@ def _change_costs(columns: np.ndarray, candidates: np.ndarray, end: int) -> np.n
     return costs
 
 
-def onset_of_the_impact(recording: Recording) -> Onset | None:
-    """`find_onset` of the vehicle's and the barrier's channels, or of all where those show none: a dummy is shaken and
-    sways on the way to the barrier, and of many channels some do so at the same time."""
-    channels = recording.test.channels
-    chosen = [k for k, channel in enumerate(channels) if takes_part_in_the_impact(channel)]
-    if chosen and len(chosen) < len(channels):
-        test = replace(recording.test, channels=tuple(channels[k] for k in chosen))
-        onset = find_onset(Recording(test, recording.time_ns, recording.values[:, chosen]))
-        if onset:
-            return onset
-    return find_onset(recording)
-
-
 def at_onset(recording: Recording) -> Recording:
     """The recording with its time zero at the onset; the notes say by how much it has moved.
 
     Raises RecordingError where there is no onset to be found.
     """
-    onset = onset_of_the_impact(recording)
+    onset = find_onset(recording)
     if onset is None:
         raise RecordingError(
             f"test {recording.test.id}: no onset found: no acceleration or force is at rest in the first "
@@ -231,7 +231,7 @@ def moved_time_zero(recording: Recording, by_ns: int, why: str) -> Recording:
 
 def onset_note(recording: Recording) -> str:
     """A line where the signals begin elsewhere than at the stated time zero, and what to do; "" else."""
-    onset = onset_of_the_impact(recording)
+    onset = find_onset(recording)
     if onset is None or not onset.differs:
         return ""
     return (
