@@ -93,6 +93,7 @@ MISTAKES = [
         "11: not valid YAML: key 'tension' appears more than once",
     ),
     ("[door, rib]", "[door, rib", "9: not valid YAML: "),
+    ("16.8", "2019-13-04", "4: not valid YAML: '2019-13-04' is no date (month must be in 1..12)"),
     (
         "door\n",
         "!!python/object/apply:os.getcwd []\n",

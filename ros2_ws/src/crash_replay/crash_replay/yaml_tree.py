@@ -36,6 +36,7 @@ def parsed(path: Path) -> tuple[Node | None, Any]:
         if tree is None:
             return None, None
         _check_tree(tree)
+        _check_dates(yaml, tree)
         return tree, _printable(yaml.constructor.construct_document(tree))
     except (YAMLError, NotOurs) as error:
         raise RecordingError(f"{path}:{_line_of(error)}: not valid YAML: {_reason(error)}") from None
@@ -50,6 +51,22 @@ def _printable(value: Any) -> Any:
     if isinstance(value, dict):
         return {_printable(key): _printable(item) for key, item in value.items()}
     return [_printable(item) for item in value] if isinstance(value, list) else value
+
+
+def _check_dates(yaml: YAML, tree: Node) -> None:
+    """Raises NotOurs for what is written as a date and is none."""
+    seen, left = set(), [tree]
+    while left:
+        node = left.pop()
+        if id(node) in seen:  # of an anchor and its aliases
+            continue
+        seen.add(id(node))
+        left += (value for _, _, value in children(node))
+        if isinstance(node, ScalarNode) and node.tag.endswith(":timestamp"):
+            try:
+                yaml.constructor.construct_object(node)
+            except ValueError as error:
+                raise NotOurs(node, f"{shown(node.value)} is no date ({error})") from None
 
 
 def children(node: Node) -> Iterator[tuple[Any, Node, Node]]:

@@ -16,7 +16,7 @@ from crash_replay.recording import Recording, RecordingError
 from ..core.effects import EFFECTS
 from ..core.effects.effect import Effect
 from ..core.effects.user import load_effects
-from ..core.structure import ModelError
+from ..core.structure import ModelError, Structure
 from ..ready_models import model_path
 
 
@@ -29,6 +29,14 @@ def read_crash(source: str) -> Recording:
             f"{source}: its last sample is {-end:.4g} ms before the impact (time zero): there is nothing to learn from"
         )
     return recording
+
+
+def refuse_empty_channels(structure: Structure, recording: Recording) -> None:
+    """Raises ModelError for a channel of the model without a valid sample: what it should say, would be made up."""
+    names = {name for _, name, _ in structure.channels()} & set(recording.test.channel_names)
+    for name in sorted(names):
+        if not np.isfinite(recording.column(name)).any():
+            raise ModelError(f"test {recording.test.id}: channel {name} has no valid sample: leave it out of the model")
 
 
 def check_written(arguments: argparse.Namespace, *recordings: str | None, **outputs: str | Path | None) -> None:

@@ -12,8 +12,10 @@ from ...core.derived_motion import with_accelerations
 from ...core.errors import EquationError, equation_errors
 from ...core.estimate import Description, ElementState, Estimate, ParameterStatus
 from ...core.fold import run
+from ...core.kinematics import FEWEST
 from ...core.methods import AnyEstimator, make_estimator
 from ...core.passes import most_passes, repeats, settle
+from ...core.structure import Structure
 from ...model_file import load_model
 from ...tables import (
     besides_table,
@@ -23,14 +25,16 @@ from ...tables import (
     never_touches,
     parameter_table,
 )
-from ..common import check_written, effects_of, parse_settings, read_crash, write_json
+from ..common import check_written, effects_of, parse_settings, read_crash, refuse_empty_channels, write_json
 
 
 def estimate(arguments: argparse.Namespace) -> None:
     check_written(arguments, arguments.bag, json=arguments.json)
     effects = effects_of(arguments)
     structure = load_model(arguments.model, effects)
-    structure, (recording,) = with_accelerations(structure, [read_crash(arguments.bag)])
+    recording = read_crash(arguments.bag)
+    refuse_empty_channels(structure, recording)
+    structure, (recording,) = with_accelerations(structure, [recording])
     settings = parse_settings(arguments.set) | ({"effective_mass": True} if arguments.effective_mass else {})
 
     def make(**start: Any) -> AnyEstimator:
@@ -51,6 +55,8 @@ def estimate(arguments: argparse.Namespace) -> None:
     say(error_table(errors))
     if lost := larger_than_measured(errors):
         say(f"\n{lost}")
+    if unknown := without_noise(structure, recording):
+        say(f"\n{unknown}")
     for k, name in enumerate(description.elements):
         if all(estimate.state[k] == ElementState.APART for estimate in estimates):
             say(f"\n{never_touches(name)}")
@@ -58,6 +64,18 @@ def estimate(arguments: argparse.Namespace) -> None:
         say(f"\n{passes.text}")
     if description.extra:
         say(f"\n{besides_table(description, estimates[-1])}")
+
+
+def without_noise(structure: Structure, recording: Recording) -> str:
+    """Of equations whose measurement's noise is neither stated nor recorded; "" where there are none."""
+    bodies = [structure.bodies[k] for k in structure.equations]
+    names = [body.name for body in bodies if not body.noise]
+    if not names or np.count_nonzero(recording.time_ns < 0) >= FEWEST:
+        return ""
+    return (
+        f"{', '.join(names)}: fewer than {FEWEST} samples before time zero tell the noise, so the sigmas say nothing; "
+        "record 20 ms before it, or state `noise` of these bodies"
+    )
 
 
 def as_json(

@@ -10,7 +10,7 @@ from crash_replay.said import say
 
 from ...model_file import load_model
 from ...report_page import write_report
-from ..common import check_written, effects_of, read_crash
+from ..common import check_written, effects_of, read_crash, refuse_empty_channels
 from .simulate import smoother
 
 
@@ -22,6 +22,7 @@ def report(arguments: argparse.Namespace) -> None:
     effects = effects_of(arguments)
     structure = load_model(arguments.model, effects)
     recording = read_crash(arguments.bag)
+    refuse_empty_channels(structure, recording)
     smooth, said = smoother(recording, arguments.cfc)
     page = write_report(
         recording, structure, list(dict.fromkeys(arguments.methods)), folder, arguments.end, smooth, said,

@@ -20,7 +20,7 @@ from ...core.structure import ModelError, Structure
 from ...model_file import load_model
 from ...tables import millimetres, table
 from ...validation_tables import comparison_table
-from ..common import check_written, effects_of, parse_settings, read_crash, write_json
+from ..common import check_written, effects_of, parse_settings, read_crash, refuse_empty_channels, write_json
 
 FILTER = 60
 """CFC of signals that are rated, unless told otherwise: that of a vehicle structure's acceleration (SAE J211-1)."""
@@ -34,13 +34,16 @@ def simulate(arguments: argparse.Namespace) -> None:
     recording = read_crash(arguments.bag)
     if not arguments.end > 0.0:
         raise ModelError(f"--end must be a time after the impact, above 0 s, got {arguments.end:g}")
+    refuse_empty_channels(model, recording)
     model, (recording,) = with_accelerations(model, [recording])
     estimator = make_estimator(model, recording.test, arguments.method, **settings)
     estimates = run(estimator, recording.samples())
     description, structure = estimator.description, applied(model, recording.test, effects)
     laws = characteristics(structure, description, estimates)
     if arguments.source:
-        _, (other,) = with_accelerations(as_given, [read_crash(arguments.source)])
+        other = read_crash(arguments.source)
+        refuse_empty_channels(as_given, other)
+        _, (other,) = with_accelerations(as_given, [other])
         donor = make_estimator(model, other.test, arguments.method, **settings)
         laws = characteristics(structure, donor.description, run(donor, other.samples()))
     simulated = free_run(structure, description, estimates, laws, arguments.end, recording)

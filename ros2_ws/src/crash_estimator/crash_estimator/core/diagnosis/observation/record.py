@@ -6,12 +6,13 @@ crash model can say ends far below 1 kHz.
 """
 
 from collections.abc import Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from crash_replay.conditioning import RESTS_AT_ZERO
-from crash_replay.recording import SI_UNIT, Recording, Test
+from crash_replay.recording import SI_UNIT, Recording, RecordingError, Test
 from crash_replay.time_unit import SECOND
 
 from ...derived_motion import between_samples, smoothed
@@ -247,6 +248,16 @@ def observe(structure: Structure, recording: Recording, rest: Rest | None = None
         bins=bins,
     )
     return record.in_band(np.inf)
+
+
+def refuse_twins(recordings: Sequence[Recording]) -> None:
+    """Raises RecordingError for one that is given twice: its samples would count as those of two tests."""
+    for one, other in combinations(recordings, 2):
+        if one.values.shape == other.values.shape and np.array_equal(one.values, other.values, equal_nan=True):
+            raise RecordingError(
+                f"test {other.test.id} is given twice: its samples are those of test {one.test.id}; give each "
+                "recording once"
+            )
 
 
 def refuse_dead_channels(structure: Structure, recording: Recording) -> None:

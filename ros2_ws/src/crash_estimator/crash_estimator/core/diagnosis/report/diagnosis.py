@@ -14,7 +14,7 @@ from ...effects.effect import Addition, Effect
 from ...sensor_faults import without_faults
 from ...sensor_noise import ASSUMED
 from ...structure import ModelError, Structure
-from ..observation.record import refuse_dead_channels
+from ..observation.record import refuse_dead_channels, refuse_twins
 from ..output_error.gauss_newton import Fit
 from ..residuals.in_band import in_band
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
@@ -110,6 +110,7 @@ def diagnose(
     """
     if not recordings:
         raise ModelError("a diagnosis needs at least one recording")
+    refuse_twins(recordings)
     recordings, faults = without_faults(recordings)
     stated = structure, recordings
     structure, recordings = with_accelerations(structure, recordings)
