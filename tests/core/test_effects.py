@@ -110,10 +110,17 @@ def test_a_rate_law_whose_exponent_is_driven_to_its_limit_is_another_law_s(expon
 @pytest.mark.parametrize(("largest", "doubted"), [(1900.0, False), (2100.0, True)])
 def test_what_yields_and_stays_bent_is_called_so_where_it_yields_at_half_of_its_own_largest_force(largest, doubted):
     yielding, shapes = EFFECTS["yielding"], {"yield_crush": 0.02}
-    asked = {"spring": largest}.__getitem__
+    fitted = SimpleNamespace(largest_force={"spring": largest}.__getitem__)
     for variant, said in (("plastic", doubted), ("", False), ("in_curve", False)):
         addition = SimpleNamespace(target="spring", variant=variant)
-        assert yielding.is_doubt(None, addition, 5.0e4, shapes, asked) == said
+        assert yielding.is_doubt(None, addition, 5.0e4, shapes, fitted) == said
+
+
+@pytest.mark.parametrize(("loading", "doubted"), [(1.5e5, True), (1.3e5, False), (None, False)])
+def test_no_element_unloads_on_a_line_less_steep_than_it_loads_on(loading, doubted):
+    """It would give back more than it took; of a curve, which may have bent, that is not known."""
+    fitted = SimpleNamespace(constant_stiffness={"pad": loading}.__getitem__)
+    assert EFFECTS["plastic_unloading"].is_doubt(None, SimpleNamespace(target="pad"), 1.4e5, {}, fitted) == doubted
 
 
 def test_the_logarithmic_rate_doubles_the_force_too_and_counts_from_its_reference_on():

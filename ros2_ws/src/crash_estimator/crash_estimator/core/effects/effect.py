@@ -14,7 +14,7 @@ whole records (arrays) and read the history, which is made once, causally, elsew
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
@@ -236,11 +236,10 @@ class Effect:
         return 0.0
 
     def is_doubt(
-        self, magnitudes: "Magnitudes", addition: "Addition", c: float, shapes: Mapping[str, float],
-        largest_force: Callable[[str], float],
+        self, magnitudes: "Magnitudes", addition: "Addition", c: float, shapes: Mapping[str, float], fitted: "Fitted"
     ) -> bool:  # fmt: skip
         """Whether it is no more, with the coefficient and shape constants found, than what is not known of a right
-        model anyway, or than what another effect is named for; largest_force: N, of an element, as it was fitted."""
+        model anyway, or than what another effect is named for, or than physics allows; fitted: the model with it."""
         return False
 
     def stated(self, c: float, **shapes: float) -> float:
@@ -250,6 +249,16 @@ class Effect:
     def unstated(self, value: float, **shapes: float) -> float:
         """The coefficient as it is fitted."""
         return value
+
+
+class Fitted(Protocol):
+    """A model as it was fitted."""
+
+    def largest_force(self, element: str) -> float:
+        """N, pushing or pulling."""
+
+    def constant_stiffness(self, element: str) -> float | None:
+        """N/m; None where it is a function of the crush."""
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ def unstated(
 class Hardening(StaticFactor):
     """A factor of a material's."""
 
-    def is_doubt(self, magnitudes, addition, c, shapes, largest_force):
+    def is_doubt(self, magnitudes, addition, c, shapes, fitted):
         """The largest exponent: the force hardly hangs on the rate, as that of a spring of rings, whose friction asks
         only which way it moves."""
         # 0.999: a fit ends at a limit but for rounding

@@ -44,11 +44,11 @@ class Loss(ElementForce):
     def common(self):
         return replace(self, forms={form: shapes for form, shapes in self.forms.items() if form != SMOOTH})
 
-    def is_doubt(self, magnitudes, addition, c, shapes, largest_force):
+    def is_doubt(self, magnitudes, addition, c, shapes, fitted):
         if addition.variant != PLASTIC:
             return False
         yields_at = c * shapes["yield_crush"]  # N
-        return yields_at < MAIN_PART * largest_force(addition.target)
+        return yields_at < MAIN_PART * fitted.largest_force(addition.target)
 
 
 def force(motion: ElementMotion, yield_crush: float = 0.0, fading_crush: float = 0.0):

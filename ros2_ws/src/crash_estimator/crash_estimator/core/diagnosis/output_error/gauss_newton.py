@@ -80,6 +80,13 @@ class Fit(NamedTuple):
         each = zip(self.problem.experiments, self.trajectories, strict=True)
         return max(float(np.abs(force_along(element, one, self.theta, motion)).max()) for one, motion in each)
 
+    def constant_stiffness(self, element: str) -> float | None:
+        """N/m of a spring; None where it is a curve."""
+        link = next(link for link in self.layout.links if link.name == element)
+        if link.curve is not None:
+            return None
+        return link.known_stiffness if link.constant is None else float(self.theta[link.constant])
+
 
 def iterations_made() -> int:
     """Of all fits so far, each a pass over all recordings: work that is the same on every machine, and grows with the

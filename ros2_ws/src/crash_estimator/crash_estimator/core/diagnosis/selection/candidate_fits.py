@@ -235,7 +235,7 @@ class _Search:
     def _note(self, addition: Addition, found: Fit) -> None:
         shapes = found.layout.term(addition).shapes_at(found.theta)
         c = coefficient(addition, found)
-        if addition.effect.is_doubt(self.magnitudes, addition, c, shapes, found.largest_force):
+        if addition.effect.is_doubt(self.magnitudes, addition, c, shapes, found):
             return
         self.least = min(self.least, found.cost)
         gain = found.evidence - self.model.fit.evidence - odds_against(addition, found)

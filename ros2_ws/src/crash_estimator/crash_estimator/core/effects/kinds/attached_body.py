@@ -116,7 +116,7 @@ class AttachedBody(Effect):
         low, high = super().limits(magnitudes, addition)
         return low, _body(magnitudes.structure, addition.target).mass if addition.variant == HUNG else high
 
-    def is_doubt(self, magnitudes, addition, c, shapes, largest_force):
+    def is_doubt(self, magnitudes, addition, c, shapes, fitted):
         """What hangs and does not swing, at the limit of a shape constant, is something else that is slow; and a body's
         mass is not known to that share."""
         if addition.variant != HUNG:

@@ -60,7 +60,7 @@ class BodyInertia(Effect):
         of_one = WEIGHED if len(free) == 1 and not force_measured else 0.0
         return of_one + (LEFT_OUT if c < 0.0 else 0.0)
 
-    def is_doubt(self, magnitudes, addition, c, shapes, largest_force):
+    def is_doubt(self, magnitudes, addition, c, shapes, fitted):
         return abs(c) < WEIGHED_TO * self._mass(magnitudes.structure, addition)
 
     @staticmethod

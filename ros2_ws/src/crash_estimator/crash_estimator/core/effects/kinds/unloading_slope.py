@@ -50,6 +50,11 @@ class UnloadingSlope(Effect):
             for slope in [s * known for s in BESIDE_THE_MODELS] if known else [s * stiffness for s in STARTS]:
                 yield Addition(self, element.name, coefficient=slope)
 
+    def is_doubt(self, magnitudes, addition, c, shapes, fitted):
+        """A line that is less steep than the element loads gives back more than it took."""
+        loading = fitted.constant_stiffness(addition.target)
+        return loading is not None and c < loading
+
     def prior_std(self, magnitudes, addition):
         return STEEPEST * magnitudes.stiffness[magnitudes.element(addition.target)]
 
