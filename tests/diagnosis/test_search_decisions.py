@@ -237,7 +237,7 @@ def test_the_noise_is_taken_larger_until_it_stays_as_it_is(monkeypatch, changes,
     monkeypatch.setattr(selection_step, "screen_candidates", lambda *given: ways.append("screened") or found)
     monkeypatch.setattr(selection_step, "band_of_steps", lambda steps: None)
     sized = []
-    monkeypatch.setattr(selection_step, "evenly_fitted", lambda before, band, *others: sized.extend(others))
+    monkeypatch.setattr(selection_step, "evenly_fitted", lambda before, band, *others, recorded: sized.append(recorded))
     recorded = model()
     selection_step.weighed(None, {}, selection_step.SelectionStep(recorded, [candidate(500.0, fitted=fitted)]))
     assert len(larger) == times and ways == ["fitted" if fitted else "screened"] * times

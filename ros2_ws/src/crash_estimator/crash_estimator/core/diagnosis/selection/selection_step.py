@@ -95,8 +95,9 @@ def weighed(
             new = [o for o in done.candidates[:1] if o.addition.key not in fits and not o.addition.effect.profiled]
             gone_on = [*new, *found]
         done = _in_larger_noise(magnitudes, effects, recorded, noisier, gone_on)
-    known = [evenly, model] if evenly else [model]
-    return done._replace(evenly=evenly_fitted(done.before, band_of_steps([*path, done]), *known))
+    known = [evenly] if evenly else []
+    sized = evenly_fitted(done.before, band_of_steps([*path, done]), *known, recorded=model)
+    return done._replace(evenly=sized)
 
 
 def weighed_beside_a_second(
@@ -118,7 +119,7 @@ def weighed_beside_a_second(
     if _quietness(noise) < _quietness(done.before.records) + THRESHOLDS.same_noise:
         return done
     again = _in_larger_noise(magnitudes, effects, recorded, noise, recorded.candidates)
-    return again._replace(evenly=evenly_fitted(again.before, band, model)) if again.best else done
+    return again._replace(evenly=evenly_fitted(again.before, band, recorded=model)) if again.best else done
 
 
 def _in_larger_noise(
