@@ -93,7 +93,7 @@ def test_a_rise_that_takes_its_time_to_get_out_of_the_noise(rise, noise, median_
 
 
 def test_dummies_that_sway_on_the_way_are_no_impact():
-    """As in NHTSA 10146 with all of its channels: a neck's and a leg's, of 120, leave their rest 40 ms before it."""
+    """As in NHTSA 10146 with all of its channels: a neck's and a leg's, of 105, leave their rest 40 ms before it."""
     time = np.arange(-600, 1000) * 1e-4
     impact, swaying = np.clip(time / 0.1, 0.0, 1.0), np.clip((time + 0.04) / 0.01, 0.0, 1.0)
     clean = np.array([300.0 * np.sin(np.pi * impact), 200.0 * swaying, 150.0 * swaying]).T
