@@ -9,6 +9,8 @@ from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.core.diagnosis.selection import search_limit
 from crash_estimator.model_file import load_model
 from crash_replay.bag import read_bag
+from crash_replay.gravity import G
+from crash_replay.recording import Recording, RecordingError
 
 FRONTAL = ROOT / "bags" / "frontal_single.mcap"
 
@@ -23,6 +25,15 @@ def test_a_search_ends_after_a_number_of_iterations_unless_a_time_is_stated(monk
         assert any(fitted) and not all(fitted)
     whole = diagnose(structure, recordings, seconds=float("inf"))
     assert not whole.stopped and "stopped" not in whole.text
+
+
+def test_a_wrong_unit_is_named_though_the_search_has_ended_after_its_iterations(monkeypatch):
+    recording = read_bag(FRONTAL)
+    values = recording.values.copy()
+    values[:, recording.test.index("barrier_fx")] *= G
+    monkeypatch.setattr(search_limit, "LONGEST_SEARCH", 20)
+    with pytest.raises(RecordingError, match="channel barrier_fx is 9.807 times too large"):
+        diagnose(load_model("frontal_single"), [Recording(recording.test, recording.time_ns, values)])
 
 
 def test_a_time_limit_is_above_zero(monkeypatch, capsys):

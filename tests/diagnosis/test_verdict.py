@@ -261,6 +261,7 @@ def test_a_time_limit_gives_the_best_answer_so_far(frontal):
     assert "stopped after 0.001 s" in hurried.text and "stopped" not in frontal.text
     assert hurried.verdict == "unexplained" and hurried.as_json()["stopped"] is True
     assert f"not everything was tried, and {hurried.ranking[0].name} leads so far" in hurried.text
+    assert hurried.text.endswith("; signs and units of the channels were not looked at")
     assert len(hurried.ranking) >= 3 and not any(one.fitted for one in hurried.ranking)  # screened, and said to be so
 
 

@@ -119,7 +119,7 @@ def diagnose(
     with search_limit(seconds):
         begun = select_from_the_onset(structure, recordings, effects)
         stopped = search_is_over()
-    if not (stopped or begun.path.noise):
+    if not (begun.path.noise or (stopped and seconds)):  # what is stopped after so many iterations has time for that
         refuse_wrong_units(*stated, begun.path.steps[0].before, effects)
     found = _answer(structure, begun.path, tolerance, begun.zero)
     remarks = [faults] if faults else []
@@ -136,6 +136,7 @@ def diagnose(
         remarks.append(f"{signals_begin(taken)}, and are compared from there on")
     if stopped:
         remarks.append(f"stopped after {limit_text(seconds)}: not everything was tried{_so_far(found)}")
+        remarks += ["signs and units of the channels were not looked at"] if seconds else []
     return replace(found, stopped=stopped, text="; ".join([found.text, *remarks]))
 
 
