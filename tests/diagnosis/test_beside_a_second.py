@@ -59,7 +59,7 @@ def asked_for(monkeypatch, explains, quieter, gain):
         "_noise_left_by": lambda second, records: quieter,
         "_quietness": lambda records: records or 0.0,
         "_in_larger_noise": lambda m, e, recorded, noise, found: fitted.append("again") or step(model(500.0), gain),
-        "evenly_fitted": lambda before, band, recorded: "sized",
+        "evenly_fitted": lambda before, band: "sized",
         "analyse": lambda fitted: model(100.0),
     }
     for name, instead in made_up.items():

@@ -18,15 +18,11 @@ from ..residuals.in_band import in_band
 from ..residuals.residuals import analyse, output_scale
 from .fitted_model import Model
 from .search_limit import search_is_over
-from .thresholds import THRESHOLDS
 
 
-def evenly_fitted(model: Model, cfc: int | None, *others: Model, recorded: Model | None = None) -> Model:
+def evenly_fitted(model: Model, cfc: int | None, *others: Model) -> Model:
     """Of fits from where the model, and others with the same additions, have ended, and from the measured motion, the
     one that leaves the least below a class; where noise was not taken larger, or there is no time, the model itself.
-
-    recorded: the model as it was fitted in the sensors' noise; it is taken where it leaves less than half of what those
-    do, in power: in noise that relates the channels a fit may go far astray, and stay there.
 
     Whether all that is left is noise only the sensors' own noise decides: what was found of that stays.
     """
@@ -34,22 +30,12 @@ def evenly_fitted(model: Model, cfc: int | None, *others: Model, recorded: Model
     if not problem.noise_is_inflated or search_is_over():
         return model
     evenly = problem.on([_all_alike(record, problem.layout) for record in problem.records])
-
-    def settled(fitted: Fit) -> Model:
-        there = fitted._replace(problem=evenly)
-        there = there._replace(trajectories=_settled(evenly, there))
-        return model._replace(fit=there, residuals=analyse(there))
-
-    def left(one: Model) -> float:
-        return float(np.nan_to_num(in_band(one.fit, one.residuals, cfc).rms, nan=np.inf))
-
     ended = [model.fit, *(one.fit for one in others if _as_many_parameters(one.fit.layout, problem.layout))]
-    fits = [fit(evenly, model.fit.point), *(fit(evenly, one.point, FROM_SIMULATION) for one in ended), fit(evenly)]
-    least = min(map(settled, [*ended, *fits]), key=left)
-    if recorded and _as_many_parameters(recorded.fit.layout, problem.layout):
-        as_recorded = settled(recorded.fit)
-        if left(as_recorded) ** 2 < THRESHOLDS.half * left(least) ** 2:
-            least = as_recorded
+    fits = [one._replace(problem=evenly) for one in ended]
+    fits += [fit(evenly, model.fit.point), *(fit(evenly, one.point, FROM_SIMULATION) for one in ended), fit(evenly)]
+    settled = [one._replace(trajectories=_settled(evenly, one)) for one in fits]
+    found = [model._replace(fit=one, residuals=analyse(one)) for one in settled]
+    least = min(found, key=lambda one: np.nan_to_num(in_band(one.fit, one.residuals, cfc).rms, nan=np.inf))
     return least._replace(residuals=least.residuals._replace(band_test=model.residuals.band_test))
 
 

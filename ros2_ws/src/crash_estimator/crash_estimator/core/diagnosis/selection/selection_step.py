@@ -96,8 +96,7 @@ def weighed(
             gone_on = [*new, *found]
         done = _in_larger_noise(magnitudes, effects, recorded, noisier, gone_on)
     known = [evenly] if evenly else []
-    sized = evenly_fitted(done.before, band_of_steps([*path, done]), *known, recorded=model)
-    return done._replace(evenly=sized)
+    return done._replace(evenly=evenly_fitted(done.before, band_of_steps([*path, done]), *known))
 
 
 def weighed_beside_a_second(
@@ -119,7 +118,7 @@ def weighed_beside_a_second(
     if _quietness(noise) < _quietness(done.before.records) + THRESHOLDS.same_noise:
         return done
     again = _in_larger_noise(magnitudes, effects, recorded, noise, recorded.candidates)
-    return again._replace(evenly=evenly_fitted(again.before, band, recorded=model)) if again.best else done
+    return again._replace(evenly=evenly_fitted(again.before, band)) if again.best else done
 
 
 def _in_larger_noise(

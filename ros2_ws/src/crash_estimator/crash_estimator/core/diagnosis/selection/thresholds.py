@@ -86,9 +86,6 @@ class Thresholds(NamedTuple):
       none explains as much, in the sensors' noise and in a larger one, two at once are the last that is looked for.
       Of 45 looked-at cases of the second simulator with more than noise left the best explained 0.80 and more where
       the right effect was named in the end, and less than this in 20 of the 31 that were unexplained;
-    - what a model's fits with all outputs alike leave, in power, below which it is told as it was fitted in the
-      sensors' noise: those of a drop's free curve left 60 g of 3.5. Where it is taken whenever it leaves less, NHTSA
-      10146 raw loses its engine, at 0.745 of the misfit;
     - what it lacked, that a candidate behind the best must gain under other contacts: of four looked-at ones the three
       that led to the right answer gained 0.62 and more, the one that led astray 0.25;
     - what is left, that goes along with something varying in time, from which no effect is named: of 15 development
