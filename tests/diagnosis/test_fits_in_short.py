@@ -223,3 +223,18 @@ def test_half_way_back_is_half_of_each_acceleration(recording):
     expected = trajectory.a[:, free] + 4.0
     expected[5, 0] -= 4.0
     assert_allclose(found.a[:, free], expected)
+
+
+@pytest.mark.parametrize(("stated", "estimated"), [
+    (Coefficient(5.0e4, shape="constant"), False), (Coefficient(5.0e4, estimated=True, shape="constant"), True),
+    (Coefficient(5.0e4, estimated=True), None),
+])  # fmt: skip
+def test_a_spring_s_stiffness_is_told_as_stated_or_fitted_unless_it_is_a_curve(recording, stated, estimated):
+    fitted = fit(problem_of(structure(stiffness=stated), recording)[0])
+    if estimated is None:
+        assert fitted.constant_stiffness("foam") is None
+    elif estimated:
+        (parameter,) = [link.constant for link in fitted.layout.links if link.name == "foam"]
+        assert fitted.constant_stiffness("foam") == fitted.theta[parameter] != 5.0e4
+    else:
+        assert fitted.constant_stiffness("foam") == 5.0e4

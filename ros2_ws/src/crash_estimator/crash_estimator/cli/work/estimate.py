@@ -73,8 +73,8 @@ def without_noise(structure: Structure, recording: Recording) -> str:
     if not names or np.count_nonzero(recording.time_ns < 0) >= FEWEST:
         return ""
     return (
-        f"{', '.join(names)}: fewer than {FEWEST} samples before time zero tell the noise, so the sigmas say nothing; "
-        "record 20 ms before it, or state `noise` of these bodies"
+        f"{', '.join(names)}: fewer than {FEWEST} samples before time zero tell the noise, so the sigmas may be far "
+        "too small; record 20 ms before it, or state `noise` of these bodies"
     )
 
 
