@@ -42,6 +42,20 @@ def test_another_time_zero_must_leave_noise_or_need_less_or_leave_much_less(monk
     assert onset_search._better(one, other) == is_better
 
 
+@pytest.mark.parametrize(("noise", "gain", "told"), [
+    (False, 10.0, True),
+    (False, -10.0, False),
+    (True, -10.0, True),
+])  # fmt: skip
+def test_a_time_zero_is_told_only_if_it_helps_by_itself_or_noise_is_left(noise, gain, told):
+    """A simulated friction spring behind a filter was told one of -2.9 ms at -207 nats, with a larger error."""
+    shift = Shift(0, "test", -2.9e-3, 1e-4, 1e-4)
+    zero = SimpleNamespace(shifts=(shift,), gain=lambda moved: gain)
+    found = SimpleNamespace(noise=noise, steps=[SimpleNamespace(sized=None)])
+    begun = onset_search._with_a_step_that_helps(Begun(found, zero))
+    assert (begun.zero, begun.taken) == ((zero, ()) if told else (None, (shift,)))
+
+
 @pytest.mark.parametrize(("found", "seconds", "asked"), [
     (path(0, noise=True), 1e-3, False),
     (path(1, noise=True), 1e-3, False),

@@ -1,5 +1,6 @@
 """A channel whose sign or unit is wrong, by a simulation of its own: one error names it, and no effect is told."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.core.diagnosis.selection.wrong_units import _is_too_fast
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.model_file import ModelFile
+from crash_replay.gravity import G
 from crash_replay.recording import Channel, Recording, RecordingError, Test
 
 MASSES = np.array([1000.0, 300.0])  # kg, of a cab and an engine
@@ -64,10 +66,17 @@ def crash(friction: float = 0.0) -> Recording:
     return Recording(test, np.round(time * 1e9).astype(np.int64), values)
 
 
-def times(recording: Recording, channel: str, factor: float) -> Recording:
+def times(recording: Recording, channels: str, factor: float) -> Recording:
+    """channels: one, or several between commas."""
     values = recording.values.copy()
-    values[:, recording.test.index(channel)] *= factor
+    for channel in channels.split(","):
+        values[:, recording.test.index(channel)] *= factor
     return replace(recording, values=values)
+
+
+def at(recording: Recording, speed: float) -> Recording:
+    """As if it had been stated that all came at so many m/s."""
+    return replace(recording, test=replace(recording.test, initial_velocity={"cab": speed, "engine": speed}))
 
 
 @pytest.mark.parametrize(
@@ -88,6 +97,49 @@ def test_a_channel_with_a_wrong_sign_or_unit_is_named_instead_of_an_effect(chann
         diagnose(MODEL, [times(crash(), channel, factor)], FEW)
 
 
+ACCELERATIONS = "cab_ax,engine_ax"
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"), [(-1.0, "reversed"), (G, "9.807 times too large"), (1.0 / G, "9.807 times too small")]
+)
+def test_what_is_wrong_with_all_accelerations_is_said_of_all(factor, said):
+    expected = f"^test car: (.* or )?channels cab_ax and engine_ax are {said}( or .*)?, it seems"
+    with pytest.raises(RecordingError, match=expected):
+        diagnose(MODEL, [times(crash(), ACCELERATIONS, factor)], FEW)
+
+
+def test_a_speed_that_nobody_stated_is_named():
+    """They lose 19 m/s, and are thrown back with some of it."""
+    with pytest.raises(RecordingError, match="^test car: initial_velocity is rather 9.4 to 19 m/s, it seems"):
+        diagnose(MODEL, [at(crash(), 0.0)], FEW)
+
+
+def test_a_speed_that_is_far_too_small_is_said_beside_the_verdict():
+    """Divided by 3.6 twice: then bodies touch later than they do, too."""
+    found = diagnose(MODEL, [at(crash(), SPEED / 3.6)], FEW)
+    assert found.verdict == "unexplained" and "initial_velocity is rather 9.4 to 19 m/s" in found.text
+
+
+@pytest.mark.parametrize(
+    ("channels", "factor", "said"),
+    [
+        ("barrier_fx", -1.0, "channel barrier_fx is reversed"),
+        ("barrier_fx", 1000.0, "channel barrier_fx is 1000 times too large"),
+        ("barrier_fx", 0.001, "channel barrier_fx is 1000 times too small"),
+        ("cab_ax", G, "channel cab_ax is 9.807 times too large"),
+        (ACCELERATIONS, G, "channels cab_ax and engine_ax are 9.807 times too large"),
+    ],
+)
+def test_where_an_effect_is_missing_too_it_is_said_beside_the_verdict(channels, factor, said):
+    """Friction of a fifth of what the front carries."""
+    found = diagnose(MODEL, [times(crash(friction=5e4), channels, factor)], FEW)
+    assert found.verdict == "unexplained"
+    assert re.search(
+        rf"; it may be that of car (.* or )?{said}( or .*)?: mended, \d+% of the misfit would go", found.text
+    )
+
+
 def test_of_two_recordings_the_wrong_one_is_named():
     wrong = times(crash(), "cab_ax", -1.0)
     wrong = replace(wrong, test=replace(wrong.test, id="second"))
@@ -104,6 +156,6 @@ def test_an_effect_that_makes_up_most_of_a_force_is_named_all_the_same():
 @pytest.mark.parametrize(("factor", "too_fast"), [(1.0, False), (2.0, False), (9.8, True)])
 def test_a_body_is_too_fast_that_is_thrown_back_at_more_than_it_came_with(factor, too_fast):
     recording = crash()
-    assert _is_too_fast(MODEL, times(recording, "cab_ax", factor), "cab_ax") == too_fast
+    assert _is_too_fast(MODEL, times(recording, "cab_ax", factor), ["cab_ax"]) == too_fast
     alone = replace(recording, test=replace(recording.test, initial_velocity={}))
-    assert _is_too_fast(MODEL, times(alone, "cab_ax", factor), "cab_ax") == too_fast  # than the engine
+    assert _is_too_fast(MODEL, times(alone, "cab_ax", factor), ["cab_ax"]) == too_fast  # than the engine

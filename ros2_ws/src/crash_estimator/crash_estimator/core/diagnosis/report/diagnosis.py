@@ -28,11 +28,11 @@ from ..selection.selection_path import SelectionPath, up_to
 from ..selection.selection_step import band_of_steps, fit_of_all, sized_models
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_zero import TimeZero
-from ..selection.wrong_units import refuse_wrong_units
+from ..selection.wrong_units import wrong_description
 from .fitted_constants import FittedConstant, fitted_constants
 from .left import Left, left_by
 from .ranking import Ranked, StepReport, ranking_of, step_of
-from .time_zero_step import TIME_ZERO, as_ranked, signals_begin, time_zero_step
+from .time_zero_step import TIME_ZERO, as_ranked, remarks_on_onsets, time_zero_step
 from .tolerance import DEFAULT, Tolerance, percent
 from .verdict import ADEQUATE, EFFECT_MISSING, UNEXPLAINED, Evidence, verdict_on
 from .verdict_text import verdict_text
@@ -119,21 +119,19 @@ def diagnose(
     with search_limit(seconds):
         begun = select_from_the_onset(structure, recordings, effects)
         stopped = search_is_over()
+    wrong = ""
     if not (begun.path.noise or (stopped and seconds)):  # what is stopped after so many iterations has time for that
-        refuse_wrong_units(*stated, begun.path.steps[0].before, effects)
+        wrong = wrong_description(*stated, begun.path.steps[0].before, effects)
     found = _answer(structure, begun.path, tolerance, begun.zero)
     remarks = [faults] if faults else []
+    if wrong and found.verdict == UNEXPLAINED:
+        remarks.append(wrong)
     if assumed := _with_assumed_noise(begun.path):
         remarks.append(
             f"of {', '.join(assumed)} too little is recorded at rest to tell the noise behind a filter: it is taken "
             f"for {percent(ASSUMED)} of the peak; record 20 ms before time zero, or state it (`noise` of a body)"
         )
-    elsewhere = {shift.test: shift.seconds for shift in begun.unused if shift.off(0.0)}  # whatever a filter shows early
-    if elsewhere:
-        remarks.append(signals_begin(elsewhere))
-    if begun.taken:
-        taken = {shift.test: shift.seconds for shift in begun.taken}
-        remarks.append(f"{signals_begin(taken)}, and are compared from there on")
+    remarks += remarks_on_onsets(begun)
     if stopped:
         remarks.append(f"stopped after {limit_text(seconds)}: not everything was tried{_so_far(found)}")
         remarks += ["signs and units of the channels were not looked at"] if seconds else []

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..residuals.residuals import noise_floor
 from ..selection.fitted_model import Model
+from ..selection.onset_search import Begun
 from ..selection.time_zero import TimeZero
 from .ranking import Ranked, StepReport
 
@@ -48,3 +49,13 @@ def signals_begin(tests: Mapping[str, float]) -> str:
     """tests: s from the stated time zero to the onset, of each."""
     each = ", ".join(f"{1e3 * seconds:+.3g} ms ({test})" for test, seconds in tests.items())
     return f"the signals begin {each} from the stated time zero"
+
+
+def remarks_on_onsets(begun: Begun) -> list[str]:
+    """Of those that are no step: where signals begin elsewhere, whatever a filter shows early."""
+    remarks = []
+    if elsewhere := {shift.test: shift.seconds for shift in begun.unused if shift.off(0.0)}:
+        remarks.append(signals_begin(elsewhere))
+    if taken := {shift.test: shift.seconds for shift in begun.taken}:
+        remarks.append(f"{signals_begin(taken)}, and are compared from there on")
+    return remarks

@@ -53,7 +53,7 @@ def select_from_the_onset(
 
     Raises ModelError or RecordingError where the data or the model is at fault.
     """
-    return _Search(structure, recordings, effects).begun()
+    return _with_a_step_that_helps(_Search(structure, recordings, effects).begun())
 
 
 def model_as_stated(
@@ -225,6 +225,15 @@ class _Search:
         """Their time zero."""
         moved = [at_its_own_pace(self.structure, one) for one in recordings]
         return [observe(self.structure, *each) for each in zip(moved, rests_of(moved), strict=True)]
+
+
+def _with_a_step_that_helps(begun: Begun) -> Begun:
+    """Where the model as given leaves more from the onset on, and what was found with that leaves more than noise, no
+    error of the time zero is told; that the recordings are taken from there still is."""
+    path, zero = begun.path, begun.zero
+    if not zero or path.noise or zero.gain(path.steps[0].sized) > 0.0:
+        return begun
+    return begun._replace(zero=None, taken=zero.shifts)
 
 
 def _leaves_noise_with_few(begun: Begun) -> bool:

@@ -1,14 +1,17 @@
-"""A channel with the wrong sign or in another unit than stated: no effect of a structure.
+"""A sign, a unit or a speed that is not as the test's description says: no effect of a structure.
 
-Then the model leaves a large part of some channel, and next to nothing of that once the right values are taken.
+Then the model leaves a large part of some channel, and next to nothing of that once the right values are taken; or,
+where an effect is missing as well, at least half of it goes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from crash_replay.gravity import G
+from crash_replay.limits import VELOCITY
 from crash_replay.recording import Recording, RecordingError
 
 from ...derived_motion import with_accelerations
@@ -19,6 +22,7 @@ from .onset_search import model_as_stated
 from .thresholds import THRESHOLDS
 
 KILO = 1000.0
+KM_H = 3.6
 TAKEN_FOR = {"acceleration": (G, KILO), "force": (G, KILO), "displacement": (KILO,), "velocity": (KILO,)}
 """Quantity -> by what another unit is larger: g or mm/ms^2 than m/s^2, kgf or kN than N, m than mm."""
 
@@ -26,56 +30,113 @@ FASTER = 2.0
 """Times the largest speed in a test that a body may change its own by: thrown back as fast as it came."""
 
 
-def refuse_wrong_units(
+class _Mended(NamedTuple):
+    """One thing of the description."""
+
+    what: str  # is wrong
+    left: float  # largest share of any channel's mean square, by the model as given
+    explained: float  # share of the misfit
+
+
+def wrong_description(
     structure: Structure, recordings: Sequence[Recording], given: Model, effects: Mapping[str, Effect]
-) -> None:
-    """Raises RecordingError with what may be wrong, where that explains nearly all that the model leaves.
+) -> str:
+    """What may be wrong in the description of a test, where that explains at least half of what the model leaves; empty
+    where nothing does.
 
     given: the model on all recordings; looked at is the one of which it leaves most.
+
+    Raises RecordingError where something explains nearly all.
     """
     left = _left(given)
     recording = recordings[int(np.argmax(left))]
-    if max(left) < THRESHOLDS.some or given.untouched:  # it is as likely the structure that is the wrong way round
-        return
+    if max(left) < THRESHOLDS.some:
+        return ""
+    others = list(_other_speeds(structure, recording))
+    if not given.untouched:  # else it is as likely the structure that is the wrong way round
+        others += _other_channels(structure, recording)
+    if not others:
+        return ""
     model = _model(structure, recording, effects)
-    as_stated, hopeless = max(_left(model)), (1.0 - THRESHOLDS.nearly_all) * model.fit.cost
-    others = _otherwise(structure, recording)
-    left_by = {what: max(_left(_model(structure, other, effects, hopeless))) for what, other in others}
-    enough = (1.0 - THRESHOLDS.nearly_all) * min(as_stated, 1.0)
-    likely = sorted((what for what, left in left_by.items() if left < enough), key=left_by.__getitem__)
-    if likely:
+    mended = []
+    for what, other in others:
+        otherwise = _model(structure, other, effects, THRESHOLDS.half * model.fit.cost)
+        mended.append(_Mended(what, max(_left(otherwise)), 1.0 - otherwise.fit.cost / model.fit.cost))
+    as_stated = max(_left(model))
+    may_be = [one for one in mended if one.left < as_stated and one.explained > THRESHOLDS.half]
+    likely = sorted(may_be, key=lambda one: one.left)[: THRESHOLDS.few]
+    if not likely:
+        return ""
+    what, best = " or ".join(one.what for one in likely), likely[0]
+    if best.left < (1.0 - THRESHOLDS.nearly_all) * min(as_stated, 1.0):
         raise RecordingError(
-            f"test {recording.test.id}: {' or '.join(likely)}, it seems: of the worst channel's mean square the model "
-            f"leaves {as_stated:.0%} as stated and {left_by[likely[0]]:.1%} so; mend the test's description and import "
-            "it again, or the model's masses"
+            f"test {recording.test.id}: {what}, it seems: of the worst channel's mean square the model leaves "
+            f"{as_stated:.0%} as stated and {best.left:.1%} so; mend the test's description and import it again, or "
+            "the model's masses"
         )
+    return f"it may be that of {recording.test.id} {what}: mended, {best.explained:.0%} of the misfit would go"
 
 
-def _otherwise(structure: Structure, recording: Recording) -> Iterator[tuple[str, Recording]]:
-    """The recording with one thing mended."""
-    for name, quantity in dict.fromkeys((name, quantity) for _, name, quantity in structure.channels()):
-        yield f"channel {name} is reversed", _times(recording, name, -1.0)
+def _other_channels(structure: Structure, recording: Recording) -> Iterator[tuple[str, Recording]]:
+    """The recording with the sign or unit of one channel mended, or of all of a quantity, and what is wrong then."""
+    quantities = {name: quantity for _, name, quantity in structure.channels()}
+    alike = [[name for name in quantities if quantities[name] == quantity] for quantity in TAKEN_FOR]
+    for names in [*([name] for name in quantities), *(names for names in alike if len(names) > 1)]:
+        quantity = quantities[names[0]]
+        which = f"channel {names[0]} is" if len(names) == 1 else f"channels {' and '.join(names)} are"
+        if len(names) == 1 or quantity != "acceleration" or _go_on(structure, recording):
+            yield f"{which} reversed", _times(recording, names, -1.0)
         for factor in TAKEN_FOR[quantity]:
-            yield f"channel {name} is {factor:.4g} times too small", _times(recording, name, factor)
-            if quantity != "acceleration" or _is_too_fast(structure, recording, name):
-                yield f"channel {name} is {factor:.4g} times too large", _times(recording, name, 1.0 / factor)
+            larger, smaller = (_times(recording, names, by) for by in (factor, 1.0 / factor))
+            if quantity != "acceleration" or not _is_too_fast(structure, larger, names):
+                yield f"{which} {factor:.4g} times too small", larger
+            if quantity != "acceleration" or _is_too_fast(structure, recording, names):
+                yield f"{which} {factor:.4g} times too large", smaller
 
 
-def _times(recording: Recording, name: str, factor: float) -> Recording:
+def _other_speeds(structure: Structure, recording: Recording) -> Iterator[tuple[str, Recording]]:
+    """The recording with bodies that come as fast as they lose speed, where they cannot have come as stated: unless a
+    driven body may have struck them."""
+    if any(body.driven for body in structure.bodies):
+        return
+    lost = -max(_changes_of_speed(structure, recording).values(), key=abs, default=0.0)
+    if abs(lost) > FASTER * _fastest(recording) and not VELOCITY.wrong(lost):
+        there = {body.name: lost for body in structure.bodies if body.free}
+        mended = replace(recording, test=replace(recording.test, initial_velocity=there))
+        yield f"initial_velocity is rather {lost / FASTER:.2g} to {lost:.2g} m/s", mended
+
+
+def _times(recording: Recording, names: Sequence[str], factor: float) -> Recording:
     values = recording.values.copy()
-    values[:, recording.test.index(name)] *= factor
+    values[:, [recording.test.index(name) for name in names]] *= factor
     return replace(recording, values=values)
 
 
-def _is_too_fast(structure: Structure, recording: Recording, name: str) -> bool:
-    """Whether a channel changes its body's speed by more than the others and the stated ones let it. A motion that is
-    made slower on less evidence may never come back: then any course of a force is a curve over its crush."""
-    ours = [one for _, one, quantity in structure.channels() if quantity == "acceleration"]
-    values = np.nan_to_num(recording.values[:, [recording.test.index(one) for one in ours]])
-    change = np.abs(np.cumsum(values[1:] * np.diff(recording.time)[:, None], axis=0)).max(axis=0)
-    speeds = [abs(velocity) for velocity in recording.test.initial_velocity.values()]
-    speeds += [speed for one, speed in zip(ours, change, strict=True) if one != name]
-    return change[ours.index(name)] > FASTER * max(speeds, default=np.inf)
+def _changes_of_speed(structure: Structure, recording: Recording) -> dict[str, float]:
+    """m/s by acceleration channel, the farthest from where it begins."""
+    ours = [name for _, name, quantity in structure.channels() if quantity == "acceleration"]
+    values = np.nan_to_num(recording.values[:, [recording.test.index(name) for name in ours]])
+    change = np.cumsum(values[1:] * np.diff(recording.time)[:, None], axis=0)
+    return {name: float(max(each.min(), each.max(), key=abs)) for name, each in zip(ours, change.T, strict=True)}
+
+
+def _is_too_fast(structure: Structure, recording: Recording, names: Sequence[str]) -> bool:
+    """Whether channels change their bodies' speed by more than the others and the stated ones let them. A motion that
+    is made slower on less evidence may never come back: then any course of a force is a curve over its crush."""
+    changes = {name: abs(change) for name, change in _changes_of_speed(structure, recording).items()}
+    others = [change for name, change in changes.items() if name not in names]
+    return max(changes[name] for name in names) > FASTER * (max([_fastest(recording), *others]) or np.inf)
+
+
+def _go_on(structure: Structure, recording: Recording) -> bool:
+    """Whether bodies gain speed in the impact, as these came: all reversed, what brakes them never comes back."""
+    changes, speeds = _changes_of_speed(structure, recording), recording.test.initial_velocity
+    return sum(speeds.get(b.name, 0.0) * changes[name] for b in structure.bodies for name in b.acceleration) > 0.0
+
+
+def _fastest(recording: Recording) -> float:
+    """m/s, of the stated speeds."""
+    return max(map(abs, recording.test.initial_velocity.values()), default=0.0)
 
 
 def _model(
