@@ -126,8 +126,6 @@ def test_a_speed_that_is_far_too_small_is_said_beside_the_verdict():
     [
         ("barrier_fx", -1.0, "channel barrier_fx is reversed"),
         ("barrier_fx", 1000.0, "channel barrier_fx is 1000 times too large"),
-        ("barrier_fx", 0.001, "channel barrier_fx is 1000 times too small"),
-        ("cab_ax", G, "channel cab_ax is 9.807 times too large"),
         (ACCELERATIONS, G, "channels cab_ax and engine_ax are 9.807 times too large"),
     ],
 )

@@ -124,7 +124,7 @@ def diagnose(
         wrong = wrong_description(*stated, begun.path.steps[0].before, effects)
     found = _answer(structure, begun.path, tolerance, begun.zero)
     remarks = [faults] if faults else []
-    if wrong and found.verdict == UNEXPLAINED:
+    if wrong and not found.complete:
         remarks.append(wrong)
     if assumed := _with_assumed_noise(begun.path):
         remarks.append(

@@ -22,7 +22,6 @@ from .onset_search import model_as_stated
 from .thresholds import THRESHOLDS
 
 KILO = 1000.0
-KM_H = 3.6
 TAKEN_FOR = {"acceleration": (G, KILO), "force": (G, KILO), "displacement": (KILO,), "velocity": (KILO,)}
 """Quantity -> by what another unit is larger: g or mm/ms^2 than m/s^2, kgf or kN than N, m than mm."""
 
@@ -62,19 +61,18 @@ def wrong_description(
     for what, other in others:
         otherwise = _model(structure, other, effects, THRESHOLDS.half * model.fit.cost)
         mended.append(_Mended(what, max(_left(otherwise)), 1.0 - otherwise.fit.cost / model.fit.cost))
-    as_stated = max(_left(model))
-    may_be = [one for one in mended if one.left < as_stated and one.explained > THRESHOLDS.half]
-    likely = sorted(may_be, key=lambda one: one.left)[: THRESHOLDS.few]
+    likely = sorted((one for one in mended if one.explained > THRESHOLDS.half), key=lambda one: -one.explained)
     if not likely:
         return ""
-    what, best = " or ".join(one.what for one in likely), likely[0]
-    if best.left < (1.0 - THRESHOLDS.nearly_all) * min(as_stated, 1.0):
+    what = " or ".join(one.what for one in likely[: THRESHOLDS.few])
+    as_stated, least = max(_left(model)), min(one.left for one in likely)
+    if least < (1.0 - THRESHOLDS.nearly_all) * min(as_stated, 1.0):
         raise RecordingError(
             f"test {recording.test.id}: {what}, it seems: of the worst channel's mean square the model leaves "
-            f"{as_stated:.0%} as stated and {best.left:.1%} so; mend the test's description and import it again, or "
-            "the model's masses"
+            f"{as_stated:.0%} as stated and {least:.1%} so; mend the test's description and import it again, or the "
+            "model's masses"
         )
-    return f"it may be that of {recording.test.id} {what}: mended, {best.explained:.0%} of the misfit would go"
+    return f"it may be that of {recording.test.id} {what}: mended, {likely[0].explained:.0%} of the misfit would go"
 
 
 def _other_channels(structure: Structure, recording: Recording) -> Iterator[tuple[str, Recording]]:
@@ -84,7 +82,7 @@ def _other_channels(structure: Structure, recording: Recording) -> Iterator[tupl
     for names in [*([name] for name in quantities), *(names for names in alike if len(names) > 1)]:
         quantity = quantities[names[0]]
         which = f"channel {names[0]} is" if len(names) == 1 else f"channels {' and '.join(names)} are"
-        if len(names) == 1 or quantity != "acceleration" or _go_on(structure, recording):
+        if quantity != "acceleration" or names not in alike or _go_on(structure, recording):
             yield f"{which} reversed", _times(recording, names, -1.0)
         for factor in TAKEN_FOR[quantity]:
             larger, smaller = (_times(recording, names, by) for by in (factor, 1.0 / factor))
