@@ -120,12 +120,11 @@ def diagnose(
         begun = select_from_the_onset(structure, recordings, effects)
         stopped = search_is_over()
     wrong = ""
-    if not (begun.path.noise or (stopped and seconds)):  # what is stopped after so many iterations has time for that
-        wrong = wrong_description(*stated, begun.path.steps[0].before, effects)
+    if not (stopped and seconds):  # what is stopped after so many iterations has time for that
+        wrong = wrong_description(*stated, begun.path, effects)
     found = _answer(structure, begun.path, tolerance, begun.zero)
     remarks = [faults] if faults else []
-    if wrong and not found.complete:
-        remarks.append(wrong)
+    remarks += [wrong] if wrong and found.verdict != ADEQUATE else []
     if assumed := _with_assumed_noise(begun.path):
         remarks.append(
             f"of {', '.join(assumed)} too little is recorded at rest to tell the noise behind a filter: it is taken "

@@ -17,39 +17,46 @@ from crash_replay.recording import Recording, RecordingError
 from ...derived_motion import with_accelerations
 from ...effects.effect import Effect
 from ...structure import Structure
+from .acceptance import cost_of_noise
 from .fitted_model import Model
 from .onset_search import model_as_stated
+from .selection_path import SelectionPath
 from .thresholds import THRESHOLDS
 
 KILO = 1000.0
-TAKEN_FOR = {"acceleration": (G, KILO), "force": (G, KILO), "displacement": (KILO,), "velocity": (KILO,)}
-"""Quantity -> by what another unit is larger: g or mm/ms^2 than m/s^2, kgf or kN than N, m than mm."""
+POUND = 4.448
+TAKEN_FOR = {"acceleration": (G, KILO), "force": (POUND, G, KILO), "displacement": (KILO,), "velocity": (KILO,)}
+"""Quantity -> by what another unit is larger: g or mm/ms^2 than m/s^2, lbf, kgf or kN than N, m than mm."""
 
 FASTER = 2.0
-"""Times the largest speed in a test that a body may change its own by: thrown back as fast as it came."""
+"""Times the largest speed in a test that a body may change its own by, and times the momentum at that speed that forces
+may take: thrown back as fast as they came."""
 
 
 class _Mended(NamedTuple):
     """One thing of the description."""
 
     what: str  # is wrong
-    left: float  # largest share of any channel's mean square, by the model as given
+    model: Model  # as given, with that mended
     explained: float  # share of the misfit
 
 
 def wrong_description(
-    structure: Structure, recordings: Sequence[Recording], given: Model, effects: Mapping[str, Effect]
+    structure: Structure, recordings: Sequence[Recording], path: SelectionPath, effects: Mapping[str, Effect]
 ) -> str:
-    """What may be wrong in the description of a test, where that explains at least half of what the model leaves; empty
-    where nothing does.
+    """What may be wrong in the description of a test: where it explains at least half of what the model as given
+    leaves, or leaves noise by itself as what was found does; empty where nothing does.
 
-    given: the model on all recordings; looked at is the one of which it leaves most.
+    path: what was found on all recordings; looked at is the one of which the model as given leaves most.
 
-    Raises RecordingError where something explains nearly all.
+    Raises RecordingError where something explains nearly all, and nothing that was found does.
     """
+    given = path.steps[0].before
     left = _left(given)
     recording = recordings[int(np.argmax(left))]
-    if max(left) < THRESHOLDS.some:
+    if path.noise and not path.added:
+        return ""
+    if max(left) < THRESHOLDS.some and not _go_on(structure, recording):
         return ""
     others = list(_other_speeds(structure, recording))
     if not given.untouched:  # else it is as likely the structure that is the wrong way round
@@ -57,39 +64,47 @@ def wrong_description(
     if not others:
         return ""
     model = _model(structure, recording, effects)
+    hopeless = THRESHOLDS.near_floor * cost_of_noise(model.records) if path.noise else THRESHOLDS.half * model.fit.cost
     mended = []
     for what, other in others:
-        otherwise = _model(structure, other, effects, THRESHOLDS.half * model.fit.cost)
-        mended.append(_Mended(what, max(_left(otherwise)), 1.0 - otherwise.fit.cost / model.fit.cost))
-    likely = sorted((one for one in mended if one.explained > THRESHOLDS.half), key=lambda one: -one.explained)
+        otherwise = _model(structure, other, effects, hopeless)
+        mended.append(_Mended(what, otherwise, 1.0 - otherwise.fit.cost / model.fit.cost))
+    likely = [one for one in mended if (one.model.white if path.noise else one.explained > THRESHOLDS.half)]
     if not likely:
         return ""
+    likely.sort(key=lambda one: -one.explained)
     what = " or ".join(one.what for one in likely[: THRESHOLDS.few])
-    as_stated, least = max(_left(model)), min(one.left for one in likely)
-    if least < (1.0 - THRESHOLDS.nearly_all) * min(as_stated, 1.0):
+    as_stated, least = max(_left(model)), min(max(_left(one.model)) for one in likely)
+    if not path.noise and least < (1.0 - THRESHOLDS.nearly_all) * min(as_stated, 1.0):
         raise RecordingError(
             f"test {recording.test.id}: {what}, it seems: of the worst channel's mean square the model leaves "
             f"{as_stated:.0%} as stated and {least:.1%} so; mend the test's description and import it again, or the "
             "model's masses"
         )
-    return f"it may be that of {recording.test.id} {what}: mended, {likely[0].explained:.0%} of the misfit would go"
+    then = "only noise would be left" if path.noise else f"{likely[0].explained:.0%} of the misfit would go"
+    return f"perhaps, in test {recording.test.id}, {what}: mended, {then}"
 
 
 def _other_channels(structure: Structure, recording: Recording) -> Iterator[tuple[str, Recording]]:
-    """The recording with the sign or unit of one channel mended, or of all of a quantity, and what is wrong then."""
+    """The recording with the sign or unit of one channel mended, or of all of a quantity, or the sign of all, and what
+    is wrong then."""
     quantities = {name: quantity for _, name, quantity in structure.channels()}
     alike = [[name for name in quantities if quantities[name] == quantity] for quantity in TAKEN_FOR]
+    go_on = _go_on(structure, recording)
     for names in [*([name] for name in quantities), *(names for names in alike if len(names) > 1)]:
         quantity = quantities[names[0]]
         which = f"channel {names[0]} is" if len(names) == 1 else f"channels {' and '.join(names)} are"
-        if quantity != "acceleration" or names not in alike or _go_on(structure, recording):
+        if quantity != "acceleration" or names not in alike or go_on:
             yield f"{which} reversed", _times(recording, names, -1.0)
         for factor in TAKEN_FOR[quantity]:
             larger, smaller = (_times(recording, names, by) for by in (factor, 1.0 / factor))
-            if quantity != "acceleration" or not _is_too_fast(structure, larger, names):
+            bounded = quantity in ("acceleration", "force")
+            if not bounded or not _is_too_much(structure, larger, names, quantity):
                 yield f"{which} {factor:.4g} times too small", larger
-            if quantity != "acceleration" or _is_too_fast(structure, recording, names):
+            if not bounded or _is_too_much(structure, recording, names, quantity):
                 yield f"{which} {factor:.4g} times too large", smaller
+    if go_on and len(quantities) > 1:
+        yield "all channels are reversed", _times(recording, list(quantities), -1.0)
 
 
 def _other_speeds(structure: Structure, recording: Recording) -> Iterator[tuple[str, Recording]]:
@@ -118,12 +133,23 @@ def _changes_of_speed(structure: Structure, recording: Recording) -> dict[str, f
     return {name: float(max(each.min(), each.max(), key=abs)) for name, each in zip(ours, change.T, strict=True)}
 
 
-def _is_too_fast(structure: Structure, recording: Recording, names: Sequence[str]) -> bool:
-    """Whether channels change their bodies' speed by more than the others and the stated ones let them. A motion that
-    is made slower on less evidence may never come back: then any course of a force is a curve over its crush."""
+def _is_too_much(structure: Structure, recording: Recording, names: Sequence[str], quantity: str) -> bool:
+    """Whether accelerations all change their bodies' speed by more than the others and the stated ones let them, or
+    forces on fixed bodies take more momentum than all bodies bring. A motion that is made slower on less evidence may
+    never come back: then any course of a force is a curve over its crush."""
+    if quantity == "force":
+        return _takes_too_much(structure, recording, names)
     changes = {name: abs(change) for name, change in _changes_of_speed(structure, recording).items()}
     others = [change for name, change in changes.items() if name not in names]
-    return max(changes[name] for name in names) > FASTER * (max([_fastest(recording), *others]) or np.inf)
+    return min(changes[name] for name in names) > FASTER * (max([_fastest(recording), *others]) or np.inf)
+
+
+def _takes_too_much(structure: Structure, recording: Recording, names: Sequence[str]) -> bool:
+    on_fixed = [body.force for body in structure.bodies if body.fixed and body.force in names]
+    force = np.nan_to_num(recording.values[:, [recording.test.index(name) for name in on_fixed]]).sum(axis=1)
+    impulse = np.abs(np.cumsum(force[1:] * np.diff(recording.time))).max(initial=0.0)
+    brought = sum(body.mass or 0.0 for body in structure.bodies if body.free) * _fastest(recording)
+    return bool(impulse > FASTER * (brought or np.inf))
 
 
 def _go_on(structure: Structure, recording: Recording) -> bool:
