@@ -20,6 +20,6 @@ def model(left: float, additions: int = 0, evidence: float = 0.0) -> SimpleNames
 
 
 def step(before: SimpleNamespace, gain: float = 500.0) -> SelectionStep:
-    effect = SimpleNamespace(name="friction", acts_on="element", distorts="")
+    effect = SimpleNamespace(name="friction", acts_on="element", distorts="", changes_start=False)
     addition = SimpleNamespace(effect=effect, key=("friction", "spring"))
     return SelectionStep(before, [CandidateFit(addition, gain, SimpleNamespace(evidence=gain))])

@@ -130,17 +130,20 @@ def test_an_error_of_a_channel_of_little_weight_ends_the_search(monkeypatch, err
     assert path[-1].before is final, "it is told beside what was not added"
 
 
-@pytest.mark.parametrize(("distorts", "inflated", "share", "errs"), [
-    ("delay", True, 0.96, True),
-    ("delay", True, 0.94, False),
-    ("", True, 0.96, False),  # it is no error of a channel
-    ("delay", False, 0.96, False),  # only noise is left with it
+@pytest.mark.parametrize(("distorts", "starts", "inflated", "share", "errs"), [
+    ("delay", False, True, 0.96, True),
+    ("delay", False, True, 0.94, False),
+    ("", True, True, 0.96, True),  # of a stated speed
+    ("", True, True, 0.94, False),
+    ("", False, True, 0.96, False),  # it is no error of a recording
+    ("delay", False, False, 0.96, False),  # only noise is left with it
+    ("", True, False, 0.96, False),
 ])  # fmt: skip
-def test_when_an_error_of_a_channel_is_of_little_weight(monkeypatch, distorts, inflated, share, errs):
+def test_when_an_error_of_a_recording_is_of_little_weight(monkeypatch, distorts, starts, inflated, share, errs):
     """That with what was found before nearly all of the misfit is explained, in the band that the model speaks for."""
     first, last = step(model(100.0)), step(model(3.0, 1))
     last.before.fit.problem.noise_is_inflated = inflated
-    last.best.addition.effect.distorts = distorts
+    last.best.addition.effect.distorts, last.best.addition.effect.changes_start = distorts, starts
     explained = {100.0: None, 3.0: SimpleNamespace(share_explained=lambda given: share)}
     monkeypatch.setattr(forward_selection, "band_of_steps", lambda path: 60)
     monkeypatch.setattr(forward_selection, "in_band", lambda fit, residuals, cfc: explained[residuals.mean_square])

@@ -148,8 +148,10 @@ def test_of_an_effect_in_several_forms_those_that_are_not_looked_for_first_are_r
     assert damper.without(damper) is None, "where the model has one, all its forms are common"
 
 
-def test_a_damper_that_hardly_pulls_is_told_as_one():
-    """It was told as a gas, whose coefficient meant nothing."""
+@pytest.mark.parametrize("rebound", [0.0, 4.0])
+def test_a_damper_with_valves_is_told_as_one(rebound):
+    """One that hardly pulls was told as a gas, whose coefficient meant nothing; one that pulls four times as hard as it
+    pushes, as those of wheels do, as one that does both alike."""
     sled = ModelFile.model_validate(
         {
             "name": "sled",
@@ -157,22 +159,22 @@ def test_a_damper_that_hardly_pulls_is_told_as_one():
             "elements": {"buffer": {"between": ["sled", "wall"], "stiffness": SPRING}},
         }
     ).structure()
-    found = diagnose(sled, [with_a_valve(speed) for speed in (2.0, 3.0)])
+    found = diagnose(sled, [with_valves(speed, rebound) for speed in (2.0, 3.0)])
     (step,) = found.steps
     assert (found.verdict, found.complete) == ("effect_missing", True), found.text
     assert (step.effect, step.target, step.form) == ("viscous_damping", "buffer", "uneven"), found.text
-    assert abs(step.coefficient / DAMPER - 1.0) < 0.02 and step.shape["rebound"] < 0.05
+    assert abs(step.coefficient / DAMPER - 1.0) < 0.02 and abs(step.shape["rebound"] - rebound) < 0.05
 
 
 MASS, DAMPER = 95.0, 300.0  # kg, N s/m
 SPRING = {"estimate": True, "initial": 2e4, "shape": "constant"}
 
 
-def with_a_valve(speed: float) -> Recording:
-    """A sled that swings on a spring of 30 N/mm, beside it a damper that does nothing where it is pulled."""
+def with_valves(speed: float, rebound: float) -> Recording:
+    """A sled that swings on a spring of 30 N/mm, beside it a damper that pulls by so many times of what it pushes."""
 
     def force(state):
-        return 3e4 * state[0] + DAMPER * np.maximum(state[1], 0.0)
+        return 3e4 * state[0] + DAMPER * np.where(state[1] > 0.0, 1.0, rebound) * state[1]
 
     time = np.arange(3000) / 1e4
     exactly = dict(t_eval=time, rtol=1e-8, max_step=1e-3)

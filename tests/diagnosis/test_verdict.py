@@ -49,6 +49,8 @@ LITTLE, DROWNED = left(0.009, 1.0), left(0.009, 0.13)
         ({}, DEFAULT, "effect_missing", False),
         ({"after": left(0.009, 2.0)}, DEFAULT, "effect_missing", True),
         ({"white": True, "drift": NOTHING_VARIES}, DEFAULT, "effect_missing", True),
+        ({"white": True, "drift": NOTHING_VARIES, "loud": True}, DEFAULT, "effect_missing", False),
+        ({"white": True, "drift": NOTHING_VARIES, "loud": True, "after": LITTLE}, DEFAULT, "effect_missing", True),
         ({"after": left(0.19, 9.0)}, DEFAULT, "unexplained", False),  # it explains a fifth
         ({"needed": 0.97}, DEFAULT, "unexplained", False),  # it explains 0.96, by a law that bends far
         ({"drift": VARIES, "by_first": 0.9}, DEFAULT, "unexplained", False),

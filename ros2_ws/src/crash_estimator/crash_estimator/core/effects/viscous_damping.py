@@ -34,7 +34,7 @@ EFFECT = ElementForce(
     "viscous_damping",
     "N*s/m",
     {
-        "rebound": Shape("", 1e-3, 5.0, (0.1,)),
+        "rebound": Shape("", 1e-3, 5.0, (0.1, 3.0)),
         "exponent": Shape("", 0.2, 2.0, (1.0,)),
         "power": Shape("", 0.4, 1.8, (0.7,)),
     },

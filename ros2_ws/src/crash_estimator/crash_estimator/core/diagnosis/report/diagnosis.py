@@ -194,7 +194,7 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
         complete=verdict.complete,
         left=evidence.after,
         left_before=evidence.before,
-        noise=evidence.noise,
+        noise=evidence.noise and not evidence.loud,
         tolerance=tolerance,
         text=verdict_text(verdict, evidence, tolerance, told.steps, given, final, floor, structure),
         residual_rms=Rms(given.residuals.rms, final.residuals.rms, floor),
@@ -252,6 +252,7 @@ def _evidence(path: SelectionPath, told: _Told, structure: Structure) -> Evidenc
         place_of=structure.place_of,
         assumed=bool(_with_assumed_noise(path)),
         varying=path.rival_in_time,
+        loud=told.final.residuals.rms > THRESHOLDS.near_floor**0.5 * noise_floor(path.final.fit.layout, path.records),
     )
 
 

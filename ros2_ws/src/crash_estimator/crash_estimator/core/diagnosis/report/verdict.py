@@ -32,6 +32,7 @@ class Evidence(NamedTuple):
     place_of: Callable[[str], Hashable] = str  # what two targets have in common that are the same place
     assumed: bool = False  # the noise is, of some channel: to be less than it says little
     varying: Varying | None = None  # with time, and as likely as what was found
+    loud: bool = False  # what is left is more than noise above the frequencies that the sensors' filters show
 
     @property
     def noise(self) -> bool:
@@ -55,7 +56,8 @@ def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
     if evidence.noise:
         word = EFFECT_MISSING if evidence.added else UNEXPLAINED if evidence.assumed else ADEQUATE
         too_many = evidence.added > THRESHOLDS.most_at_once
-        return Verdict(UNEXPLAINED if too_many or evidence.varying else word, True)
+        word = UNEXPLAINED if too_many or evidence.varying else word
+        return Verdict(word, word != EFFECT_MISSING or not evidence.loud or tolerance.admits(evidence.after))
     within = tolerance.admits(evidence.after)
     if evidence.added and not (evidence.varying or doubt_of(evidence, within)):
         return Verdict(EFFECT_MISSING, within)

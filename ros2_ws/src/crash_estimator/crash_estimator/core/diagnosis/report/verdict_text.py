@@ -85,7 +85,9 @@ def _missing(evidence: Evidence, tolerance: Tolerance, steps, first: Model, fina
     if evidence.noise:
         small = first.residuals.rms < THRESHOLDS.near_floor**0.5 * floor
         why = f"; small, yet noise would not leave it ({steps[0].evidence:.0f} nats of evidence)" if small else ""
-        return f"{_names(steps)}; {_size(first, final, floor)}, now white{_in_the_band(final)}{why}{advice}"
+        more = "" if tolerance.admits(evidence.after) else ", beyond which more than noise is left: incomplete"
+        white = f"now white{_in_the_band(final)}{more if evidence.loud else ''}"
+        return f"{_names(steps)}; {_size(first, final, floor)}, {white}{why}{advice}"
     within = tolerance.admits(evidence.after)
     grade = f"is within {tolerance.text}" if within else f"is more than {tolerance.text}, and is no noise: incomplete"
     explains = f"{'it' if len(steps) == 1 else 'they'} {_explained(steps, evidence)}"
