@@ -201,7 +201,7 @@ def test_a_time_zero_counts_as_what_was_added_where_no_effect_was(monkeypatch, e
         "free_run": lambda fit: SimpleNamespace(rms=1.0), "step_of": lambda *given: sure, "ranking_of": lambda step: (),
         "_drift_left_by": lambda *given: SimpleNamespace(constant=True), "time_zero_step": lambda *given: sure,
         "as_ranked": lambda moved: moved, "_explained_by_first_effect": lambda *given: 0.9,
-        "needed_share": lambda added: 0.75, "_certain": lambda *given: True,
+        "needed_share": lambda added: 0.75, "_certain": lambda *given: True, "_is_loud": lambda *given: False,
     }  # fmt: skip
     for name, instead in made_up.items():
         monkeypatch.setattr(report, name, instead)

@@ -7,7 +7,7 @@ import numpy as np
 from crash_replay.gravity import G
 from crash_replay.shown_units import readable
 
-from .core.diagnosis import THRESHOLDS, Diagnosis, MisfitWindow, Model, Ranked, StepReport
+from .core.diagnosis import THRESHOLDS, Diagnosis, MisfitWindow, Model, Ranked
 from .tables import table
 
 SHOWN = 8
@@ -59,13 +59,9 @@ def ranking_table(ranking: Sequence[Ranked]) -> str:
     return f"{table(head, [_row(ranked) for ranked in shown])}\n{legend}{screened}"
 
 
-def _named(one: Ranked | StepReport) -> str:
-    return f"{one.effect} on {one.target}" + (f" in {one.recording}" if one.recording else "")
-
-
 def _row(ranked: Ranked) -> tuple[str, ...]:
     return (
-        _named(ranked),
+        ranked.name,
         f"{ranked.coefficient:.4g}" if np.isfinite(ranked.coefficient) else "none",
         f"{ranked.std:.2g}" if np.isfinite(ranked.std) else "",
         ranked.unit,
@@ -78,7 +74,7 @@ def _row(ranked: Ranked) -> tuple[str, ...]:
 def steps_table(found: Diagnosis) -> str:
     """What was added, in order, as the fit of the last model has it; columns that say nothing are left out."""
     columns = {
-        "added": [f"+ {_named(step)}" for step in found.steps],
+        "added": [f"+ {step.name}" for step in found.steps],
         "coefficient": [f"{step.coefficient:.4g} +- {step.std:.2g} {step.unit}" for step in found.steps],
         "with": [", ".join(f"{name} {value:.3g}" for name, value in step.shape.items()) for step in found.steps],
         "evidence": [f"{step.evidence:.1f}" for step in found.steps],
@@ -102,7 +98,7 @@ def constants_table(found: Diagnosis) -> str:
 def revisions_table(found: Diagnosis) -> str:
     """Error against revision of the model: RMS over all outputs and of each, of a free run; and whether it is white."""
     runs = [found.free_run_rms.before, *(step.free_run_rms["after"] for step in found.steps)]
-    names = ["as given", *(f"+ {_named(step)}" for step in found.steps)]
+    names = ["as given", *(f"+ {step.name}" for step in found.steps)]
     rows = []
     for name, model, run in zip(names, found.models, runs):
         white = "yes" if model.residuals.band_test.white else "no"

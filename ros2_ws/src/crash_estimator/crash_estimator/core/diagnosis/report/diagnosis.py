@@ -14,7 +14,7 @@ from ...effects.effect import Addition, Effect
 from ...sensor_faults import without_faults
 from ...sensor_noise import ASSUMED
 from ...structure import ModelError, Structure
-from ..observation.record import refuse_dead_channels, refuse_twins
+from ..observation.record import ObservedRecord, refuse_dead_channels, refuse_twins
 from ..output_error.gauss_newton import Fit
 from ..residuals.in_band import in_band
 from ..residuals.misfit_windows import MisfitWindow, misfit_windows
@@ -119,12 +119,10 @@ def diagnose(
     with search_limit(seconds):
         begun = select_from_the_onset(structure, recordings, effects)
         stopped = search_is_over()
-    wrong = ""
-    if not (stopped and seconds):  # what is stopped after so many iterations has time for that
-        wrong = wrong_description(*stated, begun.path, effects)
+    # what is stopped after so many iterations has time for that
+    wrong = "" if stopped and seconds else wrong_description(*stated, begun.path, effects)
     found = _answer(structure, begun.path, tolerance, begun.zero)
-    remarks = [faults] if faults else []
-    remarks += [wrong] if wrong and found.verdict != ADEQUATE else []
+    remarks = [one for one in (faults, wrong if found.verdict != ADEQUATE else "") if one]
     if assumed := _with_assumed_noise(begun.path):
         remarks.append(
             f"of {', '.join(assumed)} too little is recorded at rest to tell the noise behind a filter: it is taken "
@@ -252,8 +250,12 @@ def _evidence(path: SelectionPath, told: _Told, structure: Structure) -> Evidenc
         place_of=structure.place_of,
         assumed=bool(_with_assumed_noise(path)),
         varying=path.rival_in_time,
-        loud=told.final.residuals.rms > THRESHOLDS.near_floor**0.5 * noise_floor(path.final.fit.layout, path.records),
+        loud=_is_loud(told.final, path.records),
     )
+
+
+def _is_loud(final: Model, records: Sequence[ObservedRecord]) -> bool:
+    return final.residuals.rms > THRESHOLDS.near_floor**0.5 * noise_floor(final.fit.layout, records)
 
 
 def _certain(added: Sequence[Addition], told: _Told) -> bool:

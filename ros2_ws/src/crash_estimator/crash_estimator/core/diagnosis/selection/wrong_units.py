@@ -24,9 +24,8 @@ from .selection_path import SelectionPath
 from .thresholds import THRESHOLDS
 
 KILO = 1000.0
-POUND = 4.448
-TAKEN_FOR = {"acceleration": (G, KILO), "force": (POUND, G, KILO), "displacement": (KILO,), "velocity": (KILO,)}
-"""Quantity -> by what another unit is larger: g or mm/ms^2 than m/s^2, lbf, kgf or kN than N, m than mm."""
+TAKEN_FOR = {"acceleration": (G, KILO), "force": (G, KILO), "displacement": (KILO,), "velocity": (KILO,)}
+"""Quantity -> by what another unit is larger: g or mm/ms^2 than m/s^2, kgf or kN than N, m than mm."""
 
 FASTER = 2.0
 """Times the largest speed in a test that a body may change its own by, and times the momentum at that speed that forces
@@ -112,11 +111,13 @@ def _other_speeds(structure: Structure, recording: Recording) -> Iterator[tuple[
     driven body may have struck them."""
     if any(body.driven for body in structure.bodies):
         return
-    lost = -max(_changes_of_speed(structure, recording).values(), key=abs, default=0.0)
-    if abs(lost) > FASTER * _fastest(recording) and not VELOCITY.wrong(lost):
+    changes = _changes_of_speed(structure, recording).values()
+    if changes and min(map(abs, changes)) > FASTER * _fastest(recording):
+        lost = -max(changes, key=abs)
         there = {body.name: lost for body in structure.bodies if body.free}
-        mended = replace(recording, test=replace(recording.test, initial_velocity=there))
-        yield f"initial_velocity is rather {lost / FASTER:.2g} to {lost:.2g} m/s", mended
+        if not VELOCITY.wrong(lost):
+            mended = replace(recording, test=replace(recording.test, initial_velocity=there))
+            yield f"initial_velocity is rather {lost / FASTER:.2g} to {lost:.2g} m/s", mended
 
 
 def _times(recording: Recording, names: Sequence[str], factor: float) -> Recording:
