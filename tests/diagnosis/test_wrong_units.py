@@ -9,7 +9,7 @@ import yaml
 from scipy.integrate import solve_ivp
 
 from crash_estimator.core.diagnosis import diagnose
-from crash_estimator.core.diagnosis.selection.wrong_units import _is_too_much
+from crash_estimator.core.diagnosis.selection.wrong_units import _is_too_much, _other_channels
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.model_file import ModelFile
 from crash_replay.gravity import G
@@ -159,3 +159,13 @@ def test_a_body_is_too_fast_that_is_thrown_back_at_more_than_it_came_with(factor
     assert (
         _is_too_much(MODEL, times(alone, "cab_ax", factor), ["cab_ax"], "acceleration") == too_fast
     )  # than the engine
+
+
+@pytest.mark.parametrize("speed", [SPEED, 0.0])
+def test_a_force_is_asked_for_in_the_units_that_the_stated_speeds_allow(speed):
+    """Without them, in all: a force that is right takes no more than twice what the bodies bring."""
+    asked = {what for what, _ in _other_channels(MODEL, at(crash(), speed))}
+    large, small = (f"channel barrier_fx is 1000 times too {way}" for way in ("large", "small"))
+    assert (large in asked, small in asked) == ((False, False) if speed else (True, True))
+    assert small in {what for what, _ in _other_channels(MODEL, times(at(crash(), speed), "barrier_fx", 1e-3))}
+    assert large in {what for what, _ in _other_channels(MODEL, times(at(crash(), speed), "barrier_fx", 1e3))}
