@@ -61,7 +61,7 @@ def ranking_table(ranking: Sequence[Ranked]) -> str:
 
 def _row(ranked: Ranked) -> tuple[str, ...]:
     return (
-        ranked.name,
+        ranked.name + (f" in {ranked.recording}" if ranked.recording else ""),
         f"{ranked.coefficient:.4g}" if np.isfinite(ranked.coefficient) else "none",
         f"{ranked.std:.2g}" if np.isfinite(ranked.std) else "",
         ranked.unit,
