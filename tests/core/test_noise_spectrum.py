@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, filtfilt, lfilter
 
-from crash_estimator.core.noise_spectrum import CORNER, TOLD, NoiseSpectrum, colour_of, noise_spectrum
+from crash_estimator.core.noise_spectrum import CORNER, TOLD, NoiseSpectrum, colour_of, noise_spectrum, seen_early
 
 PERIOD, REST, TIMES = 1e-4, 300, 60
 
@@ -58,6 +58,18 @@ def test_the_filter_class_is_found_and_the_noise_before_it(cfc):
     found = spectra(filtered(cfc))
     assert sum(one.corner == CORNER * cfc for one in found) > 0.9 * TIMES
     assert np.median([one.std for one in found]) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("cfc", (60, 180))
+@pytest.mark.parametrize("loud", (300.0, 3000.0))
+def test_a_loud_jump_stands_out_of_the_noise_as_early_as_said(cfc, loud):
+    """Not by a time constant of the filter less, and never earlier."""
+    n, corner = 4000, CORNER * cfc
+    shown = filtered(cfc)(np.repeat([0.0, loud], n))
+    early = (n - np.flatnonzero(np.abs(shown) > 1.0)[0]) * PERIOD
+    told = seen_early(corner, loud)
+    assert early - PERIOD < told < early + 1.0 / (np.sqrt(2.0) * np.pi * corner)
+    assert told > seen_early(corner) == pytest.approx(1.0 / corner)
 
 
 def test_what_the_filter_took_in_its_band_is_given_back():

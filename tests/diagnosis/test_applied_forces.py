@@ -122,7 +122,7 @@ def test_no_onset_is_sought_where_measured_forces_push_all_free_bodies(model, mo
     structure = model(AXIS.replace("  frame:", f"  block: {thrown}\n  frame:"))
     onset = Shift(0, "axis", 5e-3, 1e-4, 1e-4)
     monkeypatch.setattr(onset_search, "onsets", lambda recordings: (onset,))
-    monkeypatch.setattr(onset_search._Search, "as_stated", [SimpleNamespace(seen_early=0.0)])
+    monkeypatch.setattr(onset_search._Search, "as_stated", [SimpleNamespace(onset_early=0.0)])
     assert onset_search._Search(structure, (), {}).begins == ((onset,) if sought else ())
 
 

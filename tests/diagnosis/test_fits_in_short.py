@@ -62,6 +62,18 @@ def test_a_fit_ends_after_its_last_step_where_that_is_better(recording):
     assert once.theta[term] != theta[term]
 
 
+def test_a_fit_begins_as_its_problem_does_where_no_forces_can_be_fitted_along_the_measured_motion(
+    recording, monkeypatch
+):
+    problem, _ = problem_of(structure(EffectSpec("viscous_damping", "foam", 200.0)), recording)
+    nothing_finite = gauss_newton.equation_error(problem, problem.measured(problem.layout.start))
+    nothing_finite = nothing_finite._replace(matrix=np.full_like(nothing_finite.matrix, np.nan))
+    monkeypatch.setattr(gauss_newton, "equation_error", lambda problem, point: nothing_finite)
+    start = gauss_newton.equation_error_start(problem)
+    assert_allclose(start.theta, problem.layout.start, rtol=0.0)
+    assert fit(problem).cost < np.inf
+
+
 def test_a_step_after_which_nothing_is_finite_is_halved_until_a_thirty_second_is_left(recording, monkeypatch):
     problem, _ = problem_of(structure(EffectSpec("viscous_damping", "foam", 0.0)), recording)
     term = problem.layout.terms[0].coefficient

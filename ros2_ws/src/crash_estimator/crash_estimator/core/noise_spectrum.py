@@ -177,10 +177,13 @@ def _explains(colour: Colour, own: Colour, values: np.ndarray) -> bool:
     return bool(chdtrc(order, max(lost, 0.0)) > SIGNIFICANT)
 
 
-def seen_early(corner: float) -> float:
+def seen_early(corner: float, loud: float = 1.0) -> float:
     """s by which a filter that runs backward, too, shows a motion before it begins: half a period of the highest
-    frequency that it passes."""
-    return 0.5 / (PASSED * corner)
+    frequency that it passes; one that jumps by `loud` times the noise, where that is more, as long as what G makes of
+    a unit step, t before it, is above the noise:
+
+        exp(-w t) cos(w t) / 2,   w = sqrt(2) pi f0."""
+    return max(0.5 / PASSED, np.log(max(0.5 * loud, 1.0)) / (np.sqrt(2.0) * np.pi)) / corner
 
 
 def _before_the_filter(values: np.ndarray, corner: float, period: float) -> NoiseSpectrum:

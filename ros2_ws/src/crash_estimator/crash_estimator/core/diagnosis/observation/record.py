@@ -17,7 +17,7 @@ from crash_replay.time_unit import SECOND
 
 from ...derived_motion import between_samples, smoothed
 from ...kinematics import Kinematics, zero_crush
-from ...noise_spectrum import NoiseSpectrum
+from ...noise_spectrum import NoiseSpectrum, seen_early
 from ...sensor_noise import sensor_noise
 from ...structure import ModelError, Structure
 from .gaps import through_gaps
@@ -134,6 +134,13 @@ class ObservedRecord(NamedTuple):
     def seen_early(self) -> float:
         """s by which a filter that runs backward, too, may show a motion before it begins."""
         return seen_early_by(self.spectra)
+
+    @property
+    def onset_early(self) -> float:
+        """s by which its onset may come before the motion: a loud one stands out of a filter's noise from afar."""
+        filtered = ((k, noise) for k, noise in enumerate(self.spectra) if noise.corner < np.inf)
+        peaks = np.abs(np.nan_to_num(self.measured)).max(axis=0)
+        return max((seen_early(noise.corner, peaks[k] / noise.of_one_sample) for k, noise in filtered), default=0.0)
 
     @property
     def kick(self) -> np.ndarray:

@@ -155,8 +155,12 @@ def start_along(problem: OutputErrorProblem, trajectories: Sequence[Trajectory])
 
 
 def _fitting_along(problem: OutputErrorProblem, point: Point, inflate: float, stays: np.ndarray) -> Point:
+    """As they start, where forces along such a motion are beyond all bounds."""
     stays = stays | shape_parameters(problem.layout)
-    step = solve(problem.layout, equation_error(problem, point), point.theta, inflate, stays)
+    try:
+        step = solve(problem.layout, equation_error(problem, point), point.theta, inflate, stays)
+    except LinAlgError:
+        return point
     return Point(point.theta + step.delta, point.trajectories)
 
 

@@ -50,12 +50,13 @@ def normal_equations(
 
 @may_diverge
 def equation_error(problem: OutputErrorProblem, point: Point) -> Normal:
-    """The same on a given motion: without that the motion changes with the forces."""
+    """The same on a given motion, which changes neither with the forces nor with what elements remember."""
     found = Normal(np.zeros((problem.layout.size,) * 2), np.zeros(problem.layout.size), 0.0, 0, 0.0)
     for experiment, trajectory in zip(problem.experiments, point.trajectories, strict=True):
         equations = linearise(experiment, point.theta, trajectory)
-        still = np.zeros_like(equations.linear.kx)
-        equations = equations._replace(linear=equations.linear._replace(kx=still, kv=still, kp=still))
+        linear = equations.linear
+        still, forgotten = np.zeros_like(linear.kx), np.zeros_like(linear.recalled)
+        equations = equations._replace(linear=linear._replace(kx=still, kv=still, kp=still, recalled=forgotten))
         found = _summed(found, experiment, point.theta, trajectory, equations)
     return found
 

@@ -135,7 +135,7 @@ class _Search:
         free = [body for body in self.structure.bodies if body.free]
         if free and all(body.applied for body in free):
             return ()
-        return tuple(one._replace(early=self.as_stated[one.recording].seen_early) for one in onsets(self.recordings))
+        return tuple(one._replace(early=self.as_stated[one.recording].onset_early) for one in onsets(self.recordings))
 
     @cached_property
     def as_stated(self) -> list[ObservedRecord]:
