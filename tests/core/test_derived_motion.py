@@ -43,3 +43,12 @@ def test_a_polynomial_is_followed_exactly_and_noise_is_smoothed_by_the_widest():
 def test_of_too_few_samples_nothing_is_derived():
     found = smoothed(np.arange(WINDOWS[0] - 1.0), DT)
     assert np.isnan(found.first).all() and np.isnan(found.second).all() and not np.isnan(found.value).any()
+
+
+def test_an_encoder_of_few_steps_is_smoothed_as_its_rounding_asks():
+    """At 250 Hz, moving by many steps or by none a sample: most neighbours' differences are those of the motion."""
+    time = np.arange(0.0, 20.0, 4e-3)
+    clean = 0.05 * np.sin(2.0 * np.pi * 0.3 * time) ** 3
+    found = smoothed(np.round(clean / 5e-5) * 5e-5, 4e-3)
+    exact = smoothed(clean, 4e-3)
+    assert np.std(found.second - exact.second) < 0.1 * np.std(exact.second)

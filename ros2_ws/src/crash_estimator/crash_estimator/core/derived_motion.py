@@ -13,7 +13,7 @@ import numpy as np
 
 from crash_replay.recording import Channel, Recording
 
-from .differences import by_differences
+from .differences import by_differences, by_rounding
 from .momentum import acceleration_by_momentum
 from .structure import Body, ModelError, Structure
 
@@ -100,7 +100,7 @@ def smoothed(values: np.ndarray, period: float) -> Smoothed:
     if len(values) < best:
         nothing = np.full_like(values, np.nan)
         return Smoothed(values, nothing, nothing)
-    noise = by_differences(values)
+    noise = max(by_differences(values), by_rounding(values))
     for window in WINDOWS[1:]:
         if window > len(values):
             break

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .differences import by_differences
+from .differences import SMALLEST, by_differences, by_rounding
 
 if TYPE_CHECKING:
     from .noise_spectrum import Colour, NoiseSpectrum
@@ -36,9 +36,6 @@ of somebody else's, filtered by CFC 60 or 180, with 20 ms of rest or more, it wa
 of nine in ten. Taken large, as noise that is taken for too small makes effects of what it leaves: of 40 such tests 31
 are told right so, 23 were without it; with 1 %, of 13 of these 6 were."""
 
-SMALLEST = 1e-6
-"""Share of the largest value that noise is taken to be at least: a simulation without any is divided by it too."""
-
 
 def sensor_noise(
     values: np.ndarray, time_ns: np.ndarray, rests: bool, alike: "Sequence[Colour]" = (), derived: bool = False
@@ -47,7 +44,7 @@ def sensor_noise(
     reach. Rest alone tells whether neighbouring samples are alike; alike: colours that the noise of other rests has;
     derived: of another channel, which has smoothed it.
 
-    It is no less than that of rounding to a recorder's steps q, q / sqrt(12) (Bennett 1948): at rest less may show."""
+    It is no less than that of rounding to a recorder's steps: at rest less may show."""
     # late: a viewer has started before there is any noise
     from .noise_spectrum import SLOWEST_FILTER, NoiseSpectrum, noise_spectrum
 
@@ -71,15 +68,8 @@ def sensor_noise(
         n_rest, n_busy = len(before), EFFICIENCY * len(after)
         pooled = np.sqrt((n_rest * rest**2 + n_busy * busy**2) / (n_rest + n_busy))
         found = NoiseSpectrum(float(pooled), n_rest + n_busy, period)
-    least = max(SMALLEST * peak, _recorder_step(values, SMALLEST * peak) / np.sqrt(12.0), 1e-12)
+    least = max(SMALLEST * peak, by_rounding(values), 1e-12)
     return found._replace(std=max(found.std, least), samples=max(found.samples, 2.0))
-
-
-def _recorder_step(values: np.ndarray, rounding: float) -> float:
-    """Least difference of two values, which is the step of a recorder of few bits; what is below `rounding` is none."""
-    apart = np.diff(np.sort(values))
-    steps = apart[apart > rounding]
-    return float(steps.min()) if len(steps) else 0.0
 
 
 def _highest_frequencies(values: np.ndarray) -> float:

@@ -88,9 +88,11 @@ def linearise(
         actions.act(term.coefficient, k, inverse[k] * force)
         for parameter, column in zip(term.shapes.values(), by_shapes, strict=True):
             actions.act(parameter, k, inverse[k] * c * column)
-    for k, parameter in layout.zeros[r].items():
-        loads[:, k] += record.signals[layout.structure.bodies[k].applied].on_grid + theta[parameter]
-        actions.act(parameter, k, np.full(len(record.time), inverse[k]))
+    for k, modes in layout.pushes[r].items():
+        courses = record.cosines[:, : len(modes)]
+        loads[:, k] += record.signals[layout.structure.bodies[k].applied].on_grid + courses @ theta[modes]
+        for parameter, course in zip(modes, courses.T, strict=True):
+            actions.act(parameter, k, inverse[k] * course)
     rows = loads * inverse
     rows[:, driven] = trajectory.a[:, driven]
     for k, parameter in layout.kicks[r].items():

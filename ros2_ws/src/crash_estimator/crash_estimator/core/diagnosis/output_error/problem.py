@@ -99,6 +99,7 @@ def embedding(base: Layout, wide: Layout) -> np.ndarray:
         for body in base.modes[r]:
             found += wide.modes[r][body]
         found += [wide.kicks[r][body] for body in base.kicks[r]]
-        found += [wide.zeros[r][body] for body in base.zeros[r]]
+        for body in base.pushes[r]:
+            found += wide.pushes[r][body]
         found += [wide.late[r]] if base.late[r] >= 0 else []
     return np.array(found)

@@ -2,11 +2,10 @@
 
 Parameters stand in this order: forces at the curves' knots, then constants of elements and effects and errors of the
 masses, then for each recording the nuisances (errors and drifts of its outputs' zeros, slow errors of its driven
-motions, errors of the velocities that it starts with, errors of the zeros of forces that are applied, how late bodies
-touch).
+motions, errors of the velocities that it starts with, slow errors of applied forces, how late bodies touch).
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from ...effects.kinds.body_inertia import WEIGHED_TO
 from ...effects.kinds.guide_force import GROUND
 from ...structure import Coefficient, Structure
 from ..observation.grid import ATTACHED_MODES, DRIVEN_MODES
+from ..observation.pace import LONG
 from ..observation.record import ObservedRecord, Output, comparable, outputs_of
 from ..observation.trajectory import Trajectory
 from .free_curve import ROUGHNESS, Curve, make_knots
@@ -66,7 +66,7 @@ class Layout(NamedTuple):
     drifts: tuple[dict[int, int], ...]  # per record, in doubt: output that is an acceleration -> its zero at the end
     modes: tuple[dict[int, range], ...]  # per record: driven body -> its modes, the mean first
     kicks: tuple[dict[int, int], ...]  # per record: body that starts as its own channel says -> error of its velocity
-    zeros: tuple[dict[int, int], ...]  # per record: body that a measured force is applied to -> error of its zero, N
+    pushes: tuple[dict[int, range], ...]  # per record: body that a measured force is applied to -> its modes, N
     late: tuple[int, ...]  # per record: how late bodies touch that coast until then, s; -1: when they touch is known
     weighed: dict[int, int]  # in doubt: free body -> relative error of its mass
     prior: Prior
@@ -154,22 +154,24 @@ def make_layout(
     weighed = _weighed(b, structure) if records[0].in_doubt else {}
     common = len(b.parameters)
     outputs = comparable(outputs_of(structure), structure, records)
-    offsets, drifts, modes, kicks, zeros, late = [], [], [], [], [], []
+    offsets, drifts, modes, kicks, pushes, late = [], [], [], [], [], []
+    driven = [(k, body.acceleration, DRIVEN_MODES) for k, body in enumerate(structure.bodies) if body.driven]
+    driven += [(k, (channel,), ATTACHED_MODES) for channel, k in attached.items()]
     for r, record in enumerate(records):
         offsets.append(len(b.parameters))
         for q in range(len(outputs)):
             b.add("offset", 0.0, record.offset_std[q])
         drifts.append(_drifts(b, outputs, record) if record.in_doubt else {})
-        modes.append(_modes(b, structure, record, attached))
+        modes.append(_modes(b, record, driven))
         kicks.append(_kicks(b, structure, magnitudes.measured[r]))
-        pushed = [(k, record.signals[body.applied]) for k, body in enumerate(structure.bodies) if body.applied]
-        zeros.append({k: b.add("zero", 0.0, signal.offset_std) for k, signal in pushed})
+        slow = DRIVEN_MODES if record.time[-1] <= LONG else 0  # in a longer one they are slower than what moves
+        pushed = [(k, (body.applied,), slow) for k, body in enumerate(structure.bodies) if body.applied]
+        pushes.append(_modes(b, record, pushed))
         late.append(_late(b, record))
     return Layout(
         structure, tuple(links), bodies, np.array(kind), outputs, knots, common, len(b.parameters), tuple(terms),
-        attached, tuple(offsets), tuple(drifts), tuple(modes), tuple(kicks), tuple(zeros), tuple(late), weighed,
-        b.prior(),
-        np.array([one.start for one in b.parameters]), tuple(one.name for one in b.parameters[knots:common]),
+        attached, tuple(offsets), tuple(drifts), tuple(modes), tuple(kicks), tuple(pushes), tuple(late), weighed,
+        b.prior(), np.array([one.start for one in b.parameters]), tuple(one.name for one in b.parameters[knots:common]),
     )  # fmt: skip
 
 
@@ -269,12 +271,11 @@ def _bounded(b: Builder, name: str, std: float) -> int:
     return b.add(name, 0.0, std, low=-limit, high=limit)
 
 
-def _modes(b: Builder, structure: Structure, record: ObservedRecord, attached: dict[str, int]) -> dict[int, range]:
-    """Mean and slow cosines of each driven channel's noise; white noise spreads its variance evenly over them."""
-    found = {}
-    driven = [(k, body.acceleration, DRIVEN_MODES) for k, body in enumerate(structure.bodies) if body.driven]
-    samples = len(record.at)
-    for k, channels, count in driven + [(k, (channel,), ATTACHED_MODES) for channel, k in attached.items()]:
+def _modes(b: Builder, record: ObservedRecord, by: Iterable[tuple[int, Sequence[str], int]]) -> dict[int, range]:
+    """Mean and so many slow cosines of the noise of channels whose mean moves or pushes a body: white noise spreads its
+    variance evenly over them."""
+    found, samples = {}, len(record.at)
+    for k, channels, count in by:
         noise = np.sqrt(sum(record.signals[c].noise ** 2 for c in channels)) / len(channels)
         offset = np.sqrt(sum(record.signals[c].offset_std ** 2 for c in channels)) / len(channels)
         found[k] = range(len(b.parameters), len(b.parameters) + 1 + count)

@@ -84,9 +84,8 @@ class PairSpring(Effect):
 
     def prior_std(self, magnitudes, addition):
         a, b = ends_of(addition.target, magnitudes.structure.body_index)
-        apart = max(float(np.ptp(m.x[:, a] - m.x[:, b])) for m in magnitudes.measured)
         force = min(magnitudes.body_force[a], magnitudes.body_force[b])
-        return HALF * force / max(apart, magnitudes.shortest_crush)
+        return HALF * force / max(magnitudes.change_of_distance(a, b), magnitudes.shortest_crush)
 
 
 def ends_of(target: str, index) -> tuple[int, int]:
