@@ -279,7 +279,7 @@ def _modes(b: Builder, record: ObservedRecord, by: Iterable[tuple[int, Sequence[
         noise = np.sqrt(sum(record.signals[c].noise ** 2 for c in channels)) / len(channels)
         offset = np.sqrt(sum(record.signals[c].offset_std ** 2 for c in channels)) / len(channels)
         found[k] = range(len(b.parameters), len(b.parameters) + 1 + count)
-        b.add("mode", 0.0, np.hypot(offset, noise / np.sqrt(samples)))
+        b.add("mode", 0.0, np.hypot(offset, noise / np.sqrt(samples)) if count else offset)
         for _ in range(count):
             b.add("mode", 0.0, noise * np.sqrt(2.0 / samples))
     return found

@@ -12,7 +12,6 @@ from ...derived_motion import with_accelerations
 from ...effects import EFFECTS
 from ...effects.effect import Addition, Effect
 from ...sensor_faults import without_faults
-from ...sensor_noise import ASSUMED
 from ...structure import ModelError, Structure
 from ..observation.record import ObservedRecord, refuse_dead_channels, refuse_twins
 from ..output_error.gauss_newton import Fit
@@ -32,8 +31,9 @@ from ..selection.wrong_units import wrong_description
 from .fitted_constants import FittedConstant, fitted_constants
 from .left import Left, left_by
 from .ranking import Ranked, StepReport, ranking_of, step_of
-from .time_zero_step import TIME_ZERO, as_ranked, remarks_on_onsets, time_zero_step
-from .tolerance import DEFAULT, Tolerance, percent
+from .remarks import remarks_on, with_assumed_noise
+from .time_zero_step import TIME_ZERO, as_ranked, time_zero_step
+from .tolerance import DEFAULT, Tolerance
 from .verdict import ADEQUATE, EFFECT_MISSING, UNEXPLAINED, Evidence, verdict_on
 from .verdict_text import verdict_text
 
@@ -123,12 +123,7 @@ def diagnose(
     wrong = "" if stopped and seconds else wrong_description(*stated, begun.path, effects)
     found = _answer(structure, begun.path, tolerance, begun.zero)
     remarks = [one for one in (faults, wrong if found.verdict != ADEQUATE else "") if one]
-    if assumed := _with_assumed_noise(begun.path):
-        remarks.append(
-            f"of {', '.join(assumed)} too little is recorded at rest to tell the noise behind a filter: it is taken "
-            f"for {percent(ASSUMED)} of the peak; record 20 ms before time zero, or state it (`noise` of a body)"
-        )
-    remarks += remarks_on_onsets(begun)
+    remarks += remarks_on(begun, missing=found.verdict == EFFECT_MISSING)
     if stopped:
         remarks.append(f"stopped after {limit_text(seconds)}: not everything was tried{_so_far(found)}")
         remarks += ["signs and units of the channels were not looked at"] if seconds else []
@@ -141,11 +136,6 @@ def _so_far(found: Diagnosis) -> str:
     if found.verdict != UNEXPLAINED or found.steps or not leads:
         return ""
     return f", and {leads[0].name} leads so far"
-
-
-def _with_assumed_noise(path: SelectionPath) -> list[str]:
-    """Tests."""
-    return [one.test.id for one in path.records if any(spectrum.assumed for spectrum in one.spectra)]
 
 
 class _Told(NamedTuple):
@@ -248,7 +238,7 @@ def _evidence(path: SelectionPath, told: _Told, structure: Structure) -> Evidenc
         by_first=_explained_by_first_effect(from_there_on, path.added, told.band),
         needed=needed_share(path.added),
         place_of=structure.place_of,
-        assumed=bool(_with_assumed_noise(path)),
+        assumed=bool(with_assumed_noise(path)),
         varying=path.rival_in_time,
         loud=_is_loud(told.final, path.records),
     )

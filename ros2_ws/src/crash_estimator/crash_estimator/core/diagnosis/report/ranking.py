@@ -109,9 +109,11 @@ def stated(term: Term, fitted: Fit) -> tuple[float, float, dict[str, float]]:
 
 
 def ranking_of(step: SelectionStep) -> tuple[Ranked, ...]:
-    """Candidates that gain anything, and at least the best three."""
+    """Candidates that gain anything, and at least the best three, but for those that are nothing, stated as one over
+    it."""
     shown = [one for k, one in enumerate(step.candidates) if one.gain > 0.0 or k < 3]
-    return tuple(_ranked(one, step.before, shown) for one in shown)
+    every = (_ranked(one, step.before, shown) for one in shown)
+    return tuple(one for one in every if np.isfinite(one.coefficient))
 
 
 def _ranked(one: CandidateFit, before: Model, shown: list[CandidateFit]) -> Ranked:
