@@ -115,6 +115,17 @@ def test_dry_friction_of_an_axis_that_a_motor_pushes_is_named(model, pulses):
     assert first.coefficient == pytest.approx(FRICTION, rel=0.05)
 
 
+def test_an_axis_that_runs_away_without_a_force_that_holds_it_lacks_something(model):
+    """Its motor works against 8 N that the model lacks: the acceleration tells next to nothing of it, and at the speed
+    that the model settles at the axis leaves all that it was seen to move by."""
+    held = pushed_axis(0.0)
+    held.values[:, held.test.index("motor_fx")] += 8.0
+    found = diagnose(model(AXIS), [held])
+    assert (found.verdict, found.complete) == ("unexplained", False)
+    assert found.left.astray == ["axis_x"] and "axis_x runs away" in found.text
+    assert diagnose(model(AXIS), [pushed_axis(0.0)]).verdict == "adequate"
+
+
 @pytest.mark.parametrize(
     ("thrown", "sought"), [("{mass: 40.0, acceleration: block_ax}", True), ("{fixed: true}", False)]
 )

@@ -123,7 +123,7 @@ def diagnose(
     wrong = "" if stopped and seconds else wrong_description(*stated, begun.path, effects)
     found = _answer(structure, begun.path, tolerance, begun.zero)
     remarks = [one for one in (faults, wrong if found.verdict != ADEQUATE else "") if one]
-    remarks += remarks_on(begun, missing=found.verdict == EFFECT_MISSING)
+    remarks += remarks_on(begun, found.verdict == EFFECT_MISSING, found.left)
     if stopped:
         remarks.append(f"stopped after {limit_text(seconds)}: not everything was tried{_so_far(found)}")
         remarks += ["signs and units of the channels were not looked at"] if seconds else []

@@ -42,6 +42,11 @@ class Left(InBand):
         return min((one.rating for one in self.channels if one.rating is not None), default=None)
 
     @property
+    def astray(self) -> list[str]:
+        """Channels that the model leaves more of than they ever show."""
+        return [one.channel for one in self.channels if one.of_peak > 1.0]
+
+    @property
     def band(self) -> str:
         if self.cfc in SLOW_CLASSES:
             return f"{self.cfc / 0.6:.2g} Hz"  # as CFC 60 passes what is below 100 Hz
@@ -61,8 +66,25 @@ def left_by(model: Model, cfc: int | None) -> Left:
     for record, residual in zip(model.records, model.residuals.residual, strict=True):
         measured, left = (in_class(values, record.period, cfc) for values in (record.measured, residual))
         channels += _channels(layout, record.test.id, measured, left, noise_in_class(record, cfc))
+    channels += _not_compared(model)
     worst_first = tuple(sorted(channels, key=lambda one: -one.of_peak))
     return Left(**vars(in_band(model.fit, model.residuals, cfc)), channels=worst_first)
+
+
+def _not_compared(model: Model) -> list[ChannelLeft]:
+    """Displacements of bodies that no spring holds, where the model leaves the range that was measured: less than that
+    the errors of the forces on a body, which add up, may do. As a share of that range, not of the peak."""
+    layout, found = model.fit.layout, []
+    compared = {output.channel for output in layout.outputs}
+    of_bodies = [(k, body.displacement) for k, body in enumerate(layout.structure.bodies) if body.free]
+    for record, motion in zip(model.records, model.fit.trajectories, strict=True):
+        for k, channel in of_bodies:
+            if channel and channel not in compared:
+                shown = record.signals[channel].on_grid
+                off, span = float(np.sqrt(np.mean((motion.x[:, k] - shown) ** 2))), float(np.ptp(shown))
+                if not off < span:
+                    found.append(ChannelLeft(channel, record.test.id, off, "m", off / max(span, 1e-12), 0.0))
+    return found
 
 
 def vibration_of(model: Model) -> float:

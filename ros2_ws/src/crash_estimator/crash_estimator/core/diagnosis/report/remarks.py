@@ -4,14 +4,15 @@ from ...sensor_noise import ASSUMED
 from ..selection.onset_search import Begun
 from ..selection.selection_path import SelectionPath
 from ..selection.thresholds import THRESHOLDS
+from .left import Left
 from .ranking import stated
 from .time_zero_step import remarks_on_onsets
 from .tolerance import percent
 
 
-def remarks_on(begun: Begun, missing: bool) -> list[str]:
-    """missing: effects are told that were added."""
-    remarks = []
+def remarks_on(begun: Begun, missing: bool, left: Left) -> list[str]:
+    """missing: effects are told that were added; left: with them."""
+    remarks = [f"{channel} runs away: the model is off by more than it ever moves" for channel in left.astray]
     if assumed := with_assumed_noise(begun.path):
         remarks.append(
             f"of {', '.join(assumed)} too little is recorded at rest to tell the noise behind a filter: it is taken "

@@ -56,7 +56,7 @@ def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
     if evidence.noise:
         word = EFFECT_MISSING if evidence.added else UNEXPLAINED if evidence.assumed else ADEQUATE
         too_many = evidence.added > THRESHOLDS.most_at_once
-        word = UNEXPLAINED if too_many or evidence.varying else word
+        word = UNEXPLAINED if too_many or evidence.varying or evidence.after.astray else word
         return Verdict(word, word != EFFECT_MISSING or not evidence.loud or tolerance.admits(evidence.after))
     within = tolerance.admits(evidence.after)
     if evidence.added and not (evidence.varying or doubt_of(evidence, within)):
