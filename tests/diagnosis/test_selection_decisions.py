@@ -10,7 +10,9 @@ from helpers_made_up_steps import model, step
 from crash_estimator.core.diagnosis.online import candidate_turns
 from crash_estimator.core.diagnosis.report import diagnosis as report
 from crash_estimator.core.diagnosis.selection import assumptions, fitted_model, pair_search, selection_path
+from crash_estimator.core.diagnosis.selection.acceptance import needed_gain
 from crash_estimator.core.diagnosis.selection.fitted_model import forces_jump
+from crash_estimator.core.diagnosis.selection.thresholds import THRESHOLDS
 
 
 @pytest.mark.parametrize(
@@ -216,3 +218,18 @@ def test_a_time_zero_counts_as_what_was_added_where_no_effect_was(monkeypatch, e
     with pytest.raises(Judged):
         report._answer(SimpleNamespace(place_of=str), path, SimpleNamespace(stated=False), zero)
     assert asked == [counted]
+
+
+@pytest.mark.parametrize(
+    ("white", "mean_square", "found", "needed"),
+    [
+        (False, 1.2, 0, THRESHOLDS.gain),
+        (False, 0.8, 0, THRESHOLDS.confounded),
+        (False, 0.8, 1, THRESHOLDS.gain),
+        (True, 1.0, 0, THRESHOLDS.confounded),
+        (True, 1.0, 1, THRESHOLDS.gain_beyond_white),
+    ],
+)
+def test_an_effect_has_to_gain_more_where_nothing_may_be_missing(white, mean_square, found, needed):
+    residuals = SimpleNamespace(mean_square=mean_square)
+    assert needed_gain(SimpleNamespace(white=white, residuals=residuals, found=("effect",) * found)) == needed

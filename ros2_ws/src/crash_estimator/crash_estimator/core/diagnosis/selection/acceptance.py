@@ -69,14 +69,16 @@ def share_explained(before, after, cfc: int | None) -> float:
     return max(left.share_explained(without), share_removed(before.residuals, after.residuals))
 
 
-def needed_gain(white: bool, found: int) -> float:
-    """Nats that the next addition must gain; white: the model leaves noise already, found: effects added so far.
+def needed_gain(model) -> float:
+    """Nats that the next addition to a `Model` must gain.
 
-    Where it does as given, that nothing is missing is a candidate too, and has to be told apart.
+    Where it leaves noise already, or as given less of it than there is, that nothing is missing is a candidate too, and
+    has to be told apart.
     """
-    if not white:
-        return THRESHOLDS.gain
-    return THRESHOLDS.gain_beyond_white if found else THRESHOLDS.confounded
+    if model.white:
+        return THRESHOLDS.gain_beyond_white if model.found else THRESHOLDS.confounded
+    less_than_noise = not model.found and model.residuals.mean_square < 1.0
+    return THRESHOLDS.confounded if less_than_noise else THRESHOLDS.gain
 
 
 def needed_share(added: Sequence[Addition]) -> float:

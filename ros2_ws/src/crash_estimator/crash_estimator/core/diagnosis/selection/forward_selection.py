@@ -90,7 +90,7 @@ def _one_by_one(
             # the candidate's fit has shown a better one of the model without it
             model, path = fair, path[:-1]
             continue
-        needed = needed_gain(model.white, len(model.found))
+        needed = needed_gain(model)
         if done.best is None or done.best.gain < needed or len(path) > THRESHOLDS.few:
             # where the noise had to be taken larger, the model before the step is the one fitted with it
             return without_the_superseded(magnitudes, path, done.before)
