@@ -29,8 +29,8 @@ class Thresholds(NamedTuple):
     """Evidences closer than this do not tell two candidates apart. More than `gain`: Laplace's approximation and the
     priors of two different laws leave some nats open between them. Nor a candidate from nothing, where the model as
     given leaves white noise: of 600 judged cases of the second simulator two that lack nothing had 6.0 and 6.1, and one
-    that lacks something 6.6; of 20 of the first with the weakest effects or the loudest sensors none had less. Nor where
-    it leaves less than noise in all: a real impactor without a damper was told one of 7 nats."""
+    that lacks something 6.6; of 20 of the first with the weakest effects or the loudest sensors none had less.
+    Nor where it leaves less than noise in all: a real impactor without a damper was told one of 7 nats."""
     form_errs: float = 0.005
     """Evidences closer than this share of the larger one do not tell two candidates apart either: so much is the form
     in which a law is written. Two hidden hystereses were told as an unloading line, which was 12 nats of 29547 ahead,
