@@ -24,7 +24,7 @@ def begun(second: Addition, gain: float):
     terms = {id(DAMPER): 0, id(second): 1}
     layout = SimpleNamespace(term=lambda one: SimpleNamespace(addition=one, coefficient=terms[id(one)], shapes={}))
     fit = SimpleNamespace(layout=layout, theta=np.array([28.5, 4.2e-4]), covariance=np.diag([0.16, 1e-10]))
-    final = SimpleNamespace(found=(DAMPER,))
+    final = SimpleNamespace(found=(DAMPER,), white=False)
     last = SimpleNamespace(before=final, best=CandidateFit(second, gain, fit))
     path = SimpleNamespace(steps=[SimpleNamespace(), last], final=final, added=(DAMPER,), records=())
     return SimpleNamespace(path=path, unused=(), taken=())

@@ -273,7 +273,8 @@ def _bounded(b: Builder, name: str, std: float) -> int:
 
 def _modes(b: Builder, record: ObservedRecord, by: Iterable[tuple[int, Sequence[str], int]]) -> dict[int, range]:
     """Mean and so many slow cosines of the noise of channels whose mean moves or pushes a body: white noise spreads its
-    variance evenly over them."""
+    variance evenly over them. Where there are none a force's zero errs as its rest says: with the noise's own mean the
+    friction of an axis, recorded for 25 s, was told as 17.5 N for 20.4."""
     found, samples = {}, len(record.at)
     for k, channels, count in by:
         noise = np.sqrt(sum(record.signals[c].noise ** 2 for c in channels)) / len(channels)
@@ -287,11 +288,8 @@ def _modes(b: Builder, record: ObservedRecord, by: Iterable[tuple[int, Sequence[
 
 def _kicks(b: Builder, structure: Structure, measured: Trajectory) -> dict[int, int]:
     """Errors of the velocities that bodies start with, where these are derivatives at the very end of a channel."""
-    found = {}
-    for k, body in enumerate(structure.bodies):
-        if body.starts_as_observed:
-            found[k] = b.add("kick", 0.0, START_ERRS * float(np.std(measured.v[:, k])))
-    return found
+    own = (k for k, body in enumerate(structure.bodies) if body.starts_as_observed)
+    return {k: b.add("kick", 0.0, START_ERRS * float(np.std(measured.v[:, k]))) for k in own}
 
 
 def _late(b: Builder, record: ObservedRecord) -> int:

@@ -27,7 +27,7 @@ from ..selection.selection_path import SelectionPath, up_to
 from ..selection.selection_step import band_of_steps, fit_of_all, sized_models
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_zero import TimeZero
-from ..selection.wrong_units import wrong_description
+from ..selection.wrong_description import wrong_description
 from .fitted_constants import FittedConstant, fitted_constants
 from .left import Left, left_by
 from .ranking import Ranked, StepReport, ranking_of, step_of

@@ -1,9 +1,9 @@
 """What a diagnosis says beside its verdict: of the noise, of onsets, and of a small error that it does not tell."""
 
 from ...sensor_noise import ASSUMED
+from ..selection.acceptance import needed_gain
 from ..selection.onset_search import Begun
 from ..selection.selection_path import SelectionPath
-from ..selection.thresholds import THRESHOLDS
 from .left import Left
 from .ranking import stated
 from .time_zero_step import remarks_on_onsets
@@ -12,7 +12,7 @@ from .tolerance import percent
 
 def remarks_on(begun: Begun, missing: bool, left: Left) -> list[str]:
     """missing: effects are told that were added; left: with them."""
-    remarks = [f"{channel} runs away: the model is off by more than it ever moves" for channel in left.astray]
+    remarks = [f"{channel} runs away: the model is off by more than all that it shows" for channel in left.astray]
     if assumed := with_assumed_noise(begun.path):
         remarks.append(
             f"of {', '.join(assumed)} too little is recorded at rest to tell the noise behind a filter: it is taken "
@@ -27,17 +27,18 @@ def with_assumed_noise(path: SelectionPath) -> list[str]:
 
 
 def _on_a_small_error(path: SelectionPath) -> list[str]:
-    """What the first effect would be beside the error of a channel or a speed that gains something, and is not told as
-    it may be the form of that: a lag of t makes a damper beside a spring k weaker by k t, whatever its sigma."""
+    """What the first effect would be beside the error of a channel or a speed that gains enough to be told, and is not,
+    as it weighs too little beside what was: a lag of t makes a damper beside a spring k weaker by k t, whatever its
+    sigma."""
     last, best = path.steps[-1], path.steps[-1].best
     if last.before is not path.final or not path.added or best is None or not best.fit:
         return []
     effect = best.addition.effect
-    if best.gain <= THRESHOLDS.gain or not (effect.distorts or effect.changes_start):
+    if best.gain < needed_gain(path.final) or not (effect.distorts or effect.changes_start):
         return []
     first = path.added[0]
     size, _, _ = stated(best.fit.layout.term(best.addition), best.fit)
     value, std, _ = stated(best.fit.layout.term(first), best.fit)
     error = f"{' on '.join(best.addition.key)} of {size:.3g} {effect.unit}"
     law = f"{' on '.join(first.key)} would be {value:.4g} +- {std:.2g} {first.effect.unit}"
-    return [f"beside {error}, which is not told as it may be its form, {law}"]
+    return [f"beside {error}, which weighs too little to be told, {law}"]

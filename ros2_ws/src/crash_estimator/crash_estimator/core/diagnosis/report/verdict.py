@@ -54,10 +54,12 @@ def verdict_on(evidence: Evidence, tolerance: Tolerance) -> Verdict:
     if (tolerance.stated or evidence.assumed) and tolerance.admits(evidence.before):
         return Verdict(ADEQUATE, True)
     if evidence.noise:
-        word = EFFECT_MISSING if evidence.added else UNEXPLAINED if evidence.assumed else ADEQUATE
+        astray = bool(evidence.after.astray)
+        word = EFFECT_MISSING if evidence.added else UNEXPLAINED if evidence.assumed or astray else ADEQUATE
         too_many = evidence.added > THRESHOLDS.most_at_once
-        word = UNEXPLAINED if too_many or evidence.varying or evidence.after.astray else word
-        return Verdict(word, word != EFFECT_MISSING or not evidence.loud or tolerance.admits(evidence.after))
+        word = UNEXPLAINED if too_many or evidence.varying else word
+        more_than_noise = astray or (word == EFFECT_MISSING and evidence.loud)
+        return Verdict(word, not more_than_noise or tolerance.admits(evidence.after))
     within = tolerance.admits(evidence.after)
     if evidence.added and not (evidence.varying or doubt_of(evidence, within)):
         return Verdict(EFFECT_MISSING, within)

@@ -9,7 +9,7 @@ import yaml
 from scipy.integrate import solve_ivp
 
 from crash_estimator.core.diagnosis import diagnose
-from crash_estimator.core.diagnosis.selection.wrong_units import _is_too_much, _other_channels
+from crash_estimator.core.diagnosis.selection.wrong_description import _is_too_much, _other_channels
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.model_file import ModelFile
 from crash_replay.gravity import G
