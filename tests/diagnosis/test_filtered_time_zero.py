@@ -104,8 +104,8 @@ def test_a_force_that_jumps_at_contact_behind_a_filter_that_nothing_tells_lacks_
 
 
 def test_a_loud_jump_that_a_filter_shows_from_afar_begins_at_its_time_zero():
-    """In noise of 0.05 % of the peak before the filter the onset comes more than half a period early."""
-    crashes = [filter_recording(noisy(damped_crash(speed), 5e-4), 60) for speed in (7.0, 13.0)]
+    """In noise of 0.5 % of the peak before the filter the onset comes more than half a period early."""
+    crashes = [filter_recording(noisy(damped_crash(speed), 5e-3), 60) for speed in (7.0, 13.0)]
     assert max(-find_onset(one).time for one in crashes) > 8.1e-3
     found = diagnosed_damped(crashes)
     assert found.verdict == "adequate" and "the signals begin" not in found.text

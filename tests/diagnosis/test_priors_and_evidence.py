@@ -80,13 +80,12 @@ def test_a_step_is_shortened_by_its_largest_change_of_a_shape_alone():
 
 
 def test_the_mean_of_two_sensors_has_an_error_smaller_by_the_root_of_two():
-    body = SimpleNamespace(driven=True, acceleration=("left", "right"))
     signal = SimpleNamespace(noise=3.0, offset_std=0.4)
     record = SimpleNamespace(at=np.arange(900), signals={"left": signal, "right": signal})
     builder = Builder()
-    found = _modes(builder, SimpleNamespace(bodies=[body]), record, {})
+    found = _modes(builder, record, [(0, ("left", "right"), 12)])
     mean, *others = [one.std for one in builder.parameters]
-    assert found == {0: range(1 + len(others))}
+    assert found == {0: range(1 + len(others))} and len(others) == 12
     assert mean == pytest.approx(np.hypot(0.4, 3.0 / 30.0) / np.sqrt(2.0))
     assert others == pytest.approx(np.full(len(others), 3.0 * np.sqrt(2.0 / 900.0) / np.sqrt(2.0)))
 

@@ -179,7 +179,7 @@ def test_that_it_is_assumed_is_said(kept, said):
     (False, 0.02, "adequate"), (True, 0.005, "adequate"), (True, 0.02, "unexplained"),
 ])  # fmt: skip
 def test_a_model_is_not_adequate_for_leaving_less_than_a_noise_that_is_assumed(assumed, of_peak, word):
-    left = SimpleNamespace(of_peak=of_peak, is_less_than_noise=True)
+    left = SimpleNamespace(of_peak=of_peak, is_less_than_noise=True, astray=[])
     constant = SimpleNamespace(constant=True, share=0.0)
     evidence = Evidence(0, True, constant, left, left, (), False, True, assumed=assumed)
     assert verdict_on(evidence, DEFAULT).word == word

@@ -138,9 +138,8 @@ class ObservedRecord(NamedTuple):
     @property
     def onset_early(self) -> float:
         """s by which its onset may come before the motion: a loud one stands out of a filter's noise from afar."""
-        filtered = ((k, noise) for k, noise in enumerate(self.spectra) if noise.corner < np.inf)
-        peaks = np.abs(np.nan_to_num(self.measured)).max(axis=0)
-        return max((seen_early(noise.corner, peaks[k] / noise.of_one_sample) for k, noise in filtered), default=0.0)
+        each = zip(self.spectra, np.abs(np.nan_to_num(self.measured)).max(axis=0), strict=True)
+        return max((seen_early(s.corner, peak / s.of_one_sample) for s, peak in each if s.corner < np.inf), default=0.0)
 
     @property
     def kick(self) -> np.ndarray:
