@@ -9,6 +9,8 @@ from crash_estimator.core.diagnosis.report import ranking
 from crash_estimator.core.diagnosis.report.left import ChannelLeft, Left
 from crash_estimator.core.diagnosis.report.ranking import ranking_of
 from crash_estimator.core.diagnosis.report.remarks import remarks_on
+from crash_estimator.core.diagnosis.report.tolerance import DEFAULT
+from crash_estimator.core.diagnosis.report.verdict import Evidence, verdict_on
 from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
 from crash_estimator.core.diagnosis.selection.thresholds import THRESHOLDS
 from crash_estimator.core.effects import EFFECTS
@@ -57,3 +59,13 @@ def test_a_ranking_has_no_effect_that_is_nothing_stated_as_one_over_it(monkeypat
     monkeypatch.setattr(ranking, "_ranked", lambda one, *_: SimpleNamespace(coefficient=found[one.addition]))
     step = SimpleNamespace(candidates=[CandidateFit(name, 1.0, None) for name in found], before=None)
     assert [one.coefficient for one in ranking_of(step)] == [2.0, -1.0]
+
+
+@pytest.mark.parametrize(("added", "word"), [(0, "unexplained"), (1, "effect_missing")])
+def test_noise_is_not_all_that_is_left_where_a_body_runs_away(added, word):
+    left = SimpleNamespace(of_peak=3.0, is_less_than_noise=True, astray=["axis_x"])
+    drift = SimpleNamespace(constant=True, share=0.0)
+    verdict = verdict_on(Evidence(added, True, drift, left, left, (), False, True), DEFAULT)
+    assert verdict == (word, False)
+    inside = SimpleNamespace(of_peak=3.0, is_less_than_noise=True, astray=[])
+    assert verdict_on(Evidence(added, True, drift, inside, inside, (), False, True), DEFAULT).complete
