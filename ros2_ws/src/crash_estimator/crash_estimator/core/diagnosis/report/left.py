@@ -82,8 +82,8 @@ def _not_compared(model: Model) -> list[ChannelLeft]:
             if channel and channel not in compared:
                 shown = record.signals[channel].on_grid
                 off, span = float(np.sqrt(np.mean((motion.x[:, k] - shown) ** 2))), float(np.ptp(shown))
-                if not off < span:
-                    found.append(ChannelLeft(channel, record.test.id, off, "m", off / max(span, 1e-12), 0.0))
+                if off > span > 0.0:
+                    found.append(ChannelLeft(channel, record.test.id, off, "m", off / span, 0.0))
     return found
 
 
