@@ -40,7 +40,7 @@ def test_a_coefficient_that_is_stated_otherwise_than_it_is_fitted_keeps_its_shar
         theta = np.array([0.05, *np.log(list(shapes.values()))])
         std = 0.01 * np.arange(1, len(theta) + 1)
         addition = Addition(effect, "spring", dict(shapes))
-        term = SimpleNamespace(addition=addition, coefficient=0, shapes={key: k for k, key in enumerate(shapes, 1)})
+        term = Term(addition, 0, {key: k for k, key in enumerate(shapes, 1)})
         value, found, said = ranking.stated(term, SimpleNamespace(theta=theta, covariance=np.diag(std**2)))
         assert_allclose(value, effect.stated(theta[0], **shapes), err_msg=name)
         assert said == pytest.approx(shapes)

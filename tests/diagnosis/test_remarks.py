@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from crash_estimator.core.diagnosis.parameterization.terms import Term
 from crash_estimator.core.diagnosis.report import ranking
 from crash_estimator.core.diagnosis.report.left import ChannelLeft, Left
 from crash_estimator.core.diagnosis.report.ranking import ranking_of
@@ -24,7 +25,7 @@ NOTHING_LEFT = Left(1.0, 1.0, 0.0, 60, ())
 def begun(second: Addition, gain: float):
     """A damper that was found, and the best candidate beside it, with which it would be 28.5 N s/m."""
     terms = {id(DAMPER): 0, id(second): 1}
-    layout = SimpleNamespace(term=lambda one: SimpleNamespace(addition=one, coefficient=terms[id(one)], shapes={}))
+    layout = SimpleNamespace(term=lambda one: Term(one, terms[id(one)], {}))
     fit = SimpleNamespace(layout=layout, theta=np.array([28.5, 4.2e-4]), covariance=np.diag([0.16, 1e-10]))
     final = SimpleNamespace(found=(DAMPER,), white=False)
     last = SimpleNamespace(before=final, best=CandidateFit(second, gain, fit))

@@ -87,8 +87,7 @@ def stated(term: Term, fitted: Fit) -> tuple[float, float, dict[str, float]]:
     logarithm is what propagates, and c (exp(s) - 1), the upper side, stands for both.
     """
     theta, covariance = fitted.theta, fitted.covariance
-    shapes = {name: float(np.exp(theta[p])) for name, p in term.shapes.items()}
-    effect, c = term.addition.effect, float(theta[term.coefficient])
+    shapes, effect, c = term.shapes_at(theta), term.addition.effect, float(theta[term.coefficient])
     if not effect.restated:
         return c, float(np.sqrt(covariance[term.coefficient, term.coefficient])), shapes
     parameters = [term.coefficient, *term.shapes.values()]

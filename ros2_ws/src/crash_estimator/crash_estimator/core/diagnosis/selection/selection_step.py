@@ -15,7 +15,7 @@ from ..output_error.normal_equations import may_diverge
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.in_band import band_of
 from ..residuals.residuals import analyse
-from .acceptance import better, share_explained
+from .acceptance import better, coefficient, share_explained
 from .candidate_fits import CandidateFit, fit_candidates, screen_candidates
 from .even_fit import evenly_fitted
 from .fitted_model import Model, fit_model
@@ -187,10 +187,8 @@ def as_fitted(model: Model, found: CandidateFit) -> Model:
 
 def as_found(found: CandidateFit) -> Addition:
     """The addition, starting where its fit has ended."""
-    theta = found.fit.theta
-    term = found.fit.layout.term(found.addition)
-    shapes = {name: float(np.exp(theta[p])) for name, p in term.shapes.items()}
-    return replace(found.addition, coefficient=float(theta[term.coefficient]), shapes=shapes)
+    shapes = found.fit.layout.term(found.addition).shapes_at(found.fit.theta)
+    return replace(found.addition, coefficient=coefficient(found.addition, found.fit), shapes=shapes)
 
 
 def sized_models(steps: Sequence[SelectionStep], final: Model) -> tuple[Model, ...]:
