@@ -27,7 +27,7 @@ from .pruning import up_to_the_least_error
 from .rare_effects import found_as_common
 from .search_limit import search_is_over
 from .selection_path import SelectionPath, in_the_sensors_noise
-from .selection_step import sized_models
+from .selection_step import models_of, sized_models
 from .thresholds import THRESHOLDS
 from .time_varying import likeliest_in_time
 
@@ -39,10 +39,8 @@ def select(structure: Structure, records: Sequence[ObservedRecord], effects: Map
     """The effects that a structure lacks, in the band below its vibration. Raises ModelError where it names an effect
     that there is not."""
     path = _in_the_best_band(structure, records, effects)
-    return _with_rival_in_time(path) if path.added and not search_is_over() else path
-
-
-def _with_rival_in_time(path: SelectionPath) -> SelectionPath:
+    if not path.added or search_is_over():
+        return path
     magnitudes, given = measure_magnitudes(path.structure, path.records, path.cells), path.steps[0].before
     as_recorded = in_the_sensors_noise(given, path.records)
     return path._replace(varying=likeliest_in_time(magnitudes, given, as_recorded, path.as_recorded.cost))
@@ -124,8 +122,7 @@ def _as_exact_as_needed(
     start, path = _in_doubt(doubted, given, most), None
     if not _leaves_noise(start):
         path = _with_curves_as_fine_as_needed(magnitudes, given, effects, elsewhere)
-        models = [step.before for step in path.steps if step.before is not given]
-        models += [] if path.steps[-1].before is path.final else [path.final]
+        models = [model for model in models_of(path.steps, path.final) if model is not given]
         fewer = (_in_doubt(doubted, model, most) for model in models if not (model is path.final and path.noise))
         if search_is_over() or not any(map(_leaves_noise, fewer)):
             return path

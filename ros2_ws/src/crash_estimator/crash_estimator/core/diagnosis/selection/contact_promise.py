@@ -18,6 +18,7 @@ from .acceptance import cost_of_noise
 from .contacts import moves_otherwise
 from .fitted_model import forces_jump
 from .selection_path import SelectionPath, in_the_sensors_noise
+from .selection_step import models_of
 from .thresholds import THRESHOLDS
 
 
@@ -31,9 +32,7 @@ def promised_by(other: Structure, path: SelectionPath, likely: Iterable[tuple[Se
     if other == path.structure or (not path.added and final.white):
         return -np.inf
     magnitudes = measure_magnitudes(other, records, path.cells)
-    models = [step.before for step in path.steps]
-    models = models if models[-1] is final else [*models, final]
-    found = ((model.additions, in_the_sensors_noise(model, records)) for model in models)
+    found = ((model.additions, in_the_sensors_noise(model, records)) for model in models_of(path.steps, final))
     felt = ((additions, one) for additions, one in found if moves_otherwise(one, other))
     likely = ((additions, one) for additions, one in likely if moves_otherwise(one, other))
     first = max((one.fit.evidence for one in path.steps[0].as_recorded[:1] if one.fit), default=-np.inf)

@@ -10,7 +10,7 @@ from ..parameterization.magnitudes import Magnitudes
 from ..residuals.in_band import in_band
 from ..residuals.residuals import analyse
 from .fitted_model import Model
-from .selection_step import SelectionStep, band_of_steps, fit_stated, sized_models
+from .selection_step import SelectionStep, band_of_steps, fit_stated, models_of, sized_models
 from .thresholds import THRESHOLDS
 
 
@@ -64,18 +64,13 @@ def up_to_the_least_error(path: Sequence[SelectionStep], final: Model) -> tuple[
     """
     if final.white:
         return list(path), final
-    models = [step.before for step in path]
-    if models[-1] is not final:
-        models.append(final)
+    models = models_of(path, final)
     told = sized_models(path, final)[: 1 + len(final.found)]
     errors = [in_band(one.fit, one.residuals, band_of_steps(path)).rms for one in told]
     last = errors.index(min(errors))
-    last = next((k for k, step in enumerate(path[:last]) if _is_nothing(step, final)), last)
+    nothing = (_is_zero(step.candidates[0].addition, fit_stated(step, final)) for step in path[:last])
+    last = next((k for k, is_nothing in enumerate(nothing) if is_nothing), last)
     return (list(path[: last + 1]), models[last]) if last < len(errors) - 1 else (list(path), final)
-
-
-def _is_nothing(step: SelectionStep, final: Model) -> bool:
-    return _is_zero(step.candidates[0].addition, fit_stated(step, final))
 
 
 def _is_zero(addition: Addition, fitted: Fit) -> bool:

@@ -191,6 +191,12 @@ def as_found(found: CandidateFit) -> Addition:
     return replace(found.addition, coefficient=coefficient(found.addition, found.fit), shapes=shapes)
 
 
+def models_of(steps: Sequence[SelectionStep], final: Model) -> list[Model]:
+    """The models before the steps, and the last one, before which the last step may have ended."""
+    models = [step.before for step in steps]
+    return models if models[-1] is final else [*models, final]
+
+
 def sized_models(steps: Sequence[SelectionStep], final: Model) -> tuple[Model, ...]:
     """The models before the steps, and the last one, whose errors are told and compared."""
     models = tuple(step.sized for step in steps)
