@@ -94,9 +94,8 @@ def test_an_effect_on_two_elements_is_looked_for_only_where_one_does_not_explain
 ):
     asked, given = [], model(white=True)
     first = SimpleNamespace(
-        leaves_noise=leaves_noise, candidates=[], best=candidate(500.0), before=given, doubted=[], as_recorded=[]
+        leaves_noise=leaves_noise, share_removed=explained, candidates=[], before=given, doubted=[], as_recorded=[]
     )
-    monkeypatch.setattr(forward_selection, "analyse", lambda fit: None)
     monkeypatch.setattr(forward_selection, "share_removed", lambda before, after: explained)
     monkeypatch.setattr(forward_selection, "common_effects", lambda *given: {})
     monkeypatch.setattr(forward_selection, "search_is_over", lambda: over)
@@ -139,8 +138,7 @@ def test_a_further_step_goes_on_only_where_a_candidate_explains_more_than_too_li
     monkeypatch.setattr(forward_selection, "is_rare", lambda addition: False)
     monkeypatch.setattr(forward_selection, "band_of_steps", lambda steps: None)
     monkeypatch.setattr(forward_selection, "as_fitted", lambda before, one: one.gain)
-    little = lambda before, gain, band: gain < THRESHOLDS.some  # noqa: E731
-    monkeypatch.setattr(forward_selection, "explains_too_little", little)
+    monkeypatch.setattr(forward_selection, "share_explained", lambda before, gain, band: gain)
     found = forward_selection._next_step(None, {}, model(additions=("one",)), ["the first step"])
     assert found == (step if believed else "screened")
 

@@ -5,12 +5,11 @@ from collections.abc import Mapping, Sequence
 from ...effects.effect import Effect
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.in_band import in_band
-from ..residuals.residuals import analyse
 from .acceptance import better, explains_too_little, needed_gain, share_explained, share_removed
 from .candidate_fits import CandidateFit
 from .even_fit import evenly_fitted
 from .fitted_model import Model
-from .pair_search import Pair, two_at_once, two_of_one_effect
+from .pair_search import two_at_once, two_of_one_effect
 from .pruning import up_to_the_least_error, without_the_superseded
 from .rare_effects import common_effects, effects_beside, elsewhere_than, is_rare, with_rare_ones
 from .search_limit import search_is_over
@@ -40,26 +39,21 @@ def forward_selection(
     """All steps, and the last model; given: what it starts from, first: its `first_step`."""
     path, final = _one_by_one(magnitudes, effects, given, [], first)
     if others := replaced(magnitudes, effects, given, path, final):
-        return _from_two(magnitudes, effects, others)
+        return _one_by_one(magnitudes, effects, *others)
     next_to_nothing = share_removed(given.residuals, final.residuals) > THRESHOLDS.nearly_all
     if final.white or next_to_nothing or search_is_over():
         return path, final
     firsts = [*first.doubted[:1], *first.as_recorded]
-    one_is_enough = first.leaves_noise or _explains_nearly_all(first)
+    one_is_enough = first.leaves_noise or first.share_removed > THRESHOLDS.nearly_all
     alike = [] if one_is_enough else two_of_one_effect(magnitudes, given, first.candidates)
     pair = two_at_once(magnitudes, effects, given, firsts, alike, _followed(path))
     if pair is None:
         return path, final
-    other = _from_two(magnitudes, effects, pair)
+    other = _one_by_one(magnitudes, effects, *pair)
     if other[1].white:
         return other
     paths = [up_to_the_least_error(*one) for one in (other, (path, final))]
     return min(paths, key=lambda one: one[1].residuals.mean_square)
-
-
-def _from_two(magnitudes: Magnitudes, effects: Mapping[str, Effect], pair: Pair) -> tuple[list[SelectionStep], Model]:
-    """On from two that were found at once."""
-    return _one_by_one(magnitudes, effects, pair.model, pair.path)
 
 
 def _one_by_one(
@@ -110,20 +104,10 @@ def _followed(path: Sequence[SelectionStep]) -> tuple[str, str] | None:
     return path[1].before.found[0].key if looked_for else None
 
 
-def _explains_nearly_all(step: SelectionStep) -> bool:
-    """The best candidate does: what it leaves may be of another kind as well as of its own."""
-    left = step.best and share_removed(step.before.residuals, analyse(step.best.fit))
-    return bool(left and left > THRESHOLDS.nearly_all)
-
-
 def _none_leads(step: SelectionStep) -> bool:
     """Whether no candidate explains so much that it could be named, or lead to what could: two at once still may."""
-    before, band = step.before, band_of_steps([step])
-    far = THRESHOLDS.near_floor <= before.residuals.mean_square < THRESHOLDS.real_structure
-    if step.leaves_noise or not far:
-        return False
-    fitted = (as_fitted(before, one) for one in step.candidates if one.fit)
-    return all(share_explained(before, larger, band) < THRESHOLDS.half for larger in fitted)
+    far = THRESHOLDS.near_floor <= step.before.residuals.mean_square < THRESHOLDS.real_structure
+    return far and not step.leaves_noise and _all_explain_less(step, THRESHOLDS.half)
 
 
 def _next_step(
@@ -140,16 +124,17 @@ def _next_step(
         step = in_recorded_noise(magnitudes, effects, model, path)
         tried = step.candidates[:1]
         step = elsewhere_than(magnitudes, rare, step) if rare else step
-        in_vain = only_to_noise or (found and not far_from_noise and _all_explain_too_little(step, path))
+        in_vain = only_to_noise or (found and not far_from_noise and _all_explain_less(step, THRESHOLDS.some, path))
         if step.leaves_noise or not in_vain:
             return step
     return only_screened(magnitudes, effects, model, tried)
 
 
-def _all_explain_too_little(step: SelectionStep, path: Sequence[SelectionStep]) -> bool:
+def _all_explain_less(step: SelectionStep, share: float, path: Sequence[SelectionStep] = ()) -> bool:
+    """All candidates that were fitted; path: the steps before."""
     before, band = step.before, band_of_steps([*path, step])
     fitted = (as_fitted(before, one) for one in step.candidates if one.fit)
-    return all(explains_too_little(before, larger, band) for larger in fitted)
+    return all(share_explained(before, larger, band) < share for larger in fitted)
 
 
 def _errs_by_little(path: Sequence[SelectionStep]) -> bool:

@@ -13,7 +13,7 @@ from ..output_error.gauss_newton import fit
 from ..output_error.problem import make_problem
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
-from .acceptance import cost_of_noise, share_removed
+from .acceptance import cost_of_noise
 from .candidate_fits import CandidateFit, begin, fit_harder, ranked
 from .fitted_model import Model
 from .search_limit import search_is_over
@@ -117,23 +117,18 @@ def _leaves_next_to_nothing(step: SelectionStep) -> bool:
         return False
     enough = THRESHOLDS.nearly_all if _near_the_floor(step) else THRESHOLDS.practically_all
     is_a_law = step.best.addition.effect.acts_on == "element"
-    return (_near_the_floor(step) or not is_a_law) and _share(step) > enough
+    return (_near_the_floor(step) or not is_a_law) and step.share_removed > enough
 
 
 def _comes_near(step: SelectionStep, rare: SelectionStep) -> bool:
     """A common one leaves as little; not where that is a share of the noise that counts, of which the rare one explains
     as much as is asked of what is named."""
-    if step.best is None or not (_near_the_floor(step) or _share(step) > THRESHOLDS.practically_all):
+    if step.best is None or not (_near_the_floor(step) or step.share_removed > THRESHOLDS.practically_all):
         return False
     next_to_none = analyse(step.best.fit).mean_square < 1.0 + THRESHOLDS.some
     noise = cost_of_noise(step.before.records)
     left, by_rare = (one.best.fit.cost - noise for one in (step, rare))
     return next_to_none or left - by_rare < THRESHOLDS.most * left
-
-
-def _share(step: SelectionStep) -> float:
-    """Of the mean square above the noise that the best takes away."""
-    return share_removed(step.before.residuals, analyse(step.best.fit))
 
 
 def _near_the_floor(step: SelectionStep) -> bool:

@@ -15,7 +15,7 @@ from ..output_error.normal_equations import may_diverge
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.in_band import band_of
 from ..residuals.residuals import analyse
-from .acceptance import better, coefficient, share_explained
+from .acceptance import better, coefficient, share_explained, share_removed
 from .candidate_fits import CandidateFit, fit_candidates, screen_candidates
 from .even_fit import evenly_fitted
 from .fitted_model import Model, fit_model
@@ -46,6 +46,11 @@ class SelectionStep(NamedTuple):
     def leaves_noise(self) -> bool:
         """Only that, without an addition or with the best."""
         return self.before.white or bool(self.best and analyse(self.best.fit).white)
+
+    @property
+    def share_removed(self) -> float:
+        """Of the mean square above the noise, by the best; 0 where none counts."""
+        return share_removed(self.before.residuals, analyse(self.best.fit)) if self.best else 0.0
 
 
 def in_recorded_noise(
