@@ -50,19 +50,17 @@ def sought(monkeypatch, beside: dict, final, path, fitted=lambda m, records, add
     """What others were sought beside, and the pair that takes the place of the final model's two; beside: what is best
     beside an addition, and the model with both."""
     monkeypatch.setattr(sequential_replacement, "search_is_over", lambda: False)
-    monkeypatch.setattr(sequential_replacement, "cost_of_noise", lambda records: 0.0)
-    monkeypatch.setattr(sequential_replacement, "effects_beside", lambda found, *given: {})
     monkeypatch.setattr(sequential_replacement, "as_found", lambda one: one.addition)
     monkeypatch.setattr(sequential_replacement, "analyse", lambda fit: SimpleNamespace(mean_square=1.5))
     monkeypatch.setattr(sequential_replacement, "fit_model", fitted)
     monkeypatch.setattr(sequential_replacement, "as_fitted", lambda given, one: model(9.0, one.addition))
     asked = []
 
-    def best(magnitudes, effects, larger, least):
-        asked.append(larger.found[0])
-        return [candidate(500.0)._replace(addition=beside[larger.found[0].key][0])]
+    def best(magnitudes, effects, given, first):
+        asked.append(first.addition)
+        return model(9.0, first.addition), [candidate(500.0)._replace(addition=beside[first.addition.key][0])]
 
-    monkeypatch.setattr(sequential_replacement, "fit_candidates", best)
+    monkeypatch.setattr(sequential_replacement, "seconds_beside", best)
     monkeypatch.setattr(sequential_replacement, "added", lambda m, larger, one: beside[larger.found[0].key][1])
     return asked, sequential_replacement.replaced(MAGNITUDES, {}, model(50.0), path, final)
 

@@ -20,8 +20,8 @@ from .fitted_model import Model
 from .search_limit import search_is_over
 
 
-def evenly_fitted(model: Model, cfc: int | None, *others: Model) -> Model:
-    """Of fits from where the model, and others with the same additions, have ended, and from the measured motion, the
+def evenly_fitted(model: Model, cfc: int | None, other: Model | None = None) -> Model:
+    """Of fits from where the model, and another with the same additions, have ended, and from the measured motion, the
     one that leaves the least below a class; where noise was not taken larger, or there is no time, the model itself.
 
     Whether all that is left is noise only the sensors' own noise decides: what was found of that stays.
@@ -30,7 +30,7 @@ def evenly_fitted(model: Model, cfc: int | None, *others: Model) -> Model:
     if not problem.noise_is_inflated or search_is_over():
         return model
     evenly = problem.on([_all_alike(record, problem.layout) for record in problem.records])
-    ended = [model.fit, *(one.fit for one in others if _as_many_parameters(one.fit.layout, problem.layout))]
+    ended = [model.fit, other.fit] if other and _as_many_parameters(other.fit.layout, problem.layout) else [model.fit]
     fits = [one._replace(problem=evenly) for one in ended]
     fits += [fit(evenly, model.fit.point), *(fit(evenly, one.point, FROM_SIMULATION) for one in ended), fit(evenly)]
     settled = [one._replace(trajectories=_settled(evenly, one)) for one in fits]

@@ -70,6 +70,15 @@ def _together(
     return Pair(both, path)
 
 
+def seconds_beside(
+    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, first: CandidateFit
+) -> tuple[Model, list[CandidateFit]]:
+    """The model with the first, and all candidates for a second one beside it."""
+    larger = as_fitted(model, first)
+    others = effects_beside([first.addition], magnitudes.structure, effects)
+    return larger, fit_candidates(magnitudes, others, larger, least=cost_of_noise(model.records))
+
+
 def _removes_nearly_all(model: Model, pair: Pair) -> bool:
     return share_removed(model.residuals, pair.model.residuals) > THRESHOLDS.nearly_all
 
@@ -90,9 +99,7 @@ def _one_after_the_other(magnitudes: Magnitudes, effects, model: Model, candidat
     for first in _leading(model, candidates)[: THRESHOLDS.few]:
         if first.addition.key == followed or analyse(first.fit).mean_square >= THRESHOLDS.real_structure:
             continue
-        larger = as_fitted(model, first)
-        beside = effects_beside([first.addition], magnitudes.structure, effects)
-        seconds = fit_candidates(magnitudes, beside, larger, least=cost_of_noise(model.records))
+        larger, seconds = seconds_beside(magnitudes, effects, model, first)
         best = next(iter(likely(seconds)), None)
         if best is None:
             continue

@@ -92,7 +92,7 @@ def weighed(
         if search_is_over() or (larger and done.best is None):  # nothing counts: in a larger noise yet, still less does
             break
         noisier = _noise_left_by(done, model.records)
-        if larger and _as_loud(noisier, done.before.records):
+        if larger and abs(_quietness(noisier) - _quietness(done.before.records)) < THRESHOLDS.same_noise:
             break
         gone_on = []
         if fits:
@@ -100,8 +100,7 @@ def weighed(
             new = [o for o in done.candidates[:1] if o.addition.key not in fits and not o.addition.effect.profiled]
             gone_on = [*new, *found]
         done = _in_larger_noise(magnitudes, effects, recorded, noisier, gone_on)
-    known = [evenly] if evenly else []
-    return done._replace(evenly=evenly_fitted(done.before, band_of_steps([*path, done]), *known))
+    return done._replace(evenly=evenly_fitted(done.before, band_of_steps([*path, done]), evenly))
 
 
 def weighed_beside_a_second(
@@ -162,10 +161,6 @@ def _noise_left_by(step: SelectionStep, records: Sequence[ObservedRecord]) -> tu
     better = [one for one in step.candidates if one.fit and one.gain > THRESHOLDS.gain]
     noises = [with_inflated_noise(records, bounded(analyse(one.fit).residual, records)) for one in better]
     return max(noises, key=_quietness)
-
-
-def _as_loud(one: Sequence[ObservedRecord], other: Sequence[ObservedRecord]) -> bool:
-    return abs(_quietness(one) - _quietness(other)) < THRESHOLDS.same_noise
 
 
 def _quietness(records: Sequence[ObservedRecord]) -> float:

@@ -6,11 +6,10 @@ from collections.abc import Mapping, Sequence
 from ...effects.effect import Addition, Effect
 from ..parameterization.magnitudes import Magnitudes
 from ..residuals.residuals import analyse
-from .acceptance import cost_of_noise, share_removed
-from .candidate_fits import CandidateFit, fit_candidates
+from .acceptance import share_removed
+from .candidate_fits import CandidateFit
 from .fitted_model import Model, fit_model
-from .pair_search import Pair, likely
-from .rare_effects import effects_beside
+from .pair_search import Pair, likely, seconds_beside
 from .search_limit import search_is_over
 from .selection_step import SelectionStep, added, as_fitted, as_found
 from .thresholds import THRESHOLDS
@@ -40,9 +39,7 @@ def replaced(
     before, kept = two
     for _ in range(THRESHOLDS.few):
         first = alone(kept)
-        larger = as_fitted(given, first)
-        beside = effects_beside([kept], magnitudes.structure, effects)
-        seconds = fit_candidates(magnitudes, beside, larger, least=cost_of_noise(given.records))
+        larger, seconds = seconds_beside(magnitudes, effects, given, first)
         best = next(iter(likely(seconds)), None)
         if best is None or best.addition.key == before.key:
             return None
