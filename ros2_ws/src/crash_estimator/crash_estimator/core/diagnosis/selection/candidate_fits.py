@@ -128,8 +128,9 @@ class _Search:
 
     def bending(self) -> Iterable[Screened]:
         """Errors that bend the motion that all curves are fitted to: no linearisation tells what those would gain."""
-        every = (one.addition for one in self.screened)
-        return (Screened(one, 0.0, 0.0, 1.0) for one in every if _bends_driven_motion(self.magnitudes, one))
+        bodies = self.magnitudes.structure.bodies
+        driven = {channel for body in bodies if body.driven for channel in body.acceleration}
+        return (one for one in self.screened if one.addition.effect.distorts and one.addition.target in driven)
 
     def go_on_from(self, found: Iterable[CandidateFit]) -> None:
         """Fit the best candidates from where their fits in another noise have ended."""
@@ -288,8 +289,3 @@ def start_from(model: Model, problem: OutputErrorProblem, addition: Addition, sc
     if screened and not addition.effect.changes_law:
         theta[problem.layout.term(addition).coefficient] = screened.coefficient
     return problem.moved(theta, model.fit.trajectories)
-
-
-def _bends_driven_motion(magnitudes: Magnitudes, addition: Addition) -> bool:
-    driven = [channel for body in magnitudes.structure.bodies if body.driven for channel in body.acceleration]
-    return bool(addition.effect.distorts) and addition.target in driven
