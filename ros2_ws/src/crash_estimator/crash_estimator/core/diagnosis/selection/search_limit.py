@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from time import monotonic
 
@@ -17,10 +17,7 @@ _end: ContextVar[tuple[float, float]] = ContextVar("end", default=(math.inf, mat
 
 
 @contextmanager
-def search_limit(seconds: float | None) -> Iterator[None]:
-    """For what is called within; None: `LONGEST_SEARCH`, whatever time that takes; inf: none."""
-    deadline = math.inf if seconds is None else monotonic() + seconds
-    most = iterations_made() + LONGEST_SEARCH if seconds is None else math.inf
+def _until(deadline: float, most: float) -> Iterator[None]:
     token = _end.set((deadline, most))
     try:
         yield
@@ -28,16 +25,18 @@ def search_limit(seconds: float | None) -> Iterator[None]:
         _end.reset(token)
 
 
-@contextmanager
-def half_of_what_is_left() -> Iterator[None]:
+def search_limit(seconds: float | None) -> AbstractContextManager[None]:
+    """For what is called within; None: `LONGEST_SEARCH`, whatever time that takes; inf: none."""
+    if seconds is None:
+        return _until(math.inf, iterations_made() + LONGEST_SEARCH)
+    return _until(monotonic() + seconds, math.inf)
+
+
+def half_of_what_is_left() -> AbstractContextManager[None]:
     """For a search within another one, which goes on after it."""
     deadline, most = _end.get()
     now, made = monotonic(), iterations_made()
-    token = _end.set((now + 0.5 * (deadline - now), made + 0.5 * (most - made)))
-    try:
-        yield
-    finally:
-        _end.reset(token)
+    return _until(now + 0.5 * (deadline - now), made + 0.5 * (most - made))
 
 
 def search_is_over() -> bool:
