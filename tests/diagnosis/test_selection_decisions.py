@@ -198,7 +198,7 @@ def test_a_time_zero_counts_as_what_was_added_where_no_effect_was(monkeypatch, e
     )
     left, sure = SimpleNamespace(share_explained=lambda before: 0.5), SimpleNamespace(coefficient=2.0, std=1.0)
     made_up = {
-        "band_of_steps": lambda steps: None, "left_by": lambda *given: left, "fit_of_all": lambda *given: None,
+        "band_of_steps": lambda steps: None, "left_by": lambda *given: left, "fit_stated": lambda *given: None,
         "sized_models": lambda steps, final: models,
         "free_run": lambda fit: SimpleNamespace(rms=1.0), "step_of": lambda *given: sure, "ranking_of": lambda step: (),
         "_drift_left_by": lambda *given: SimpleNamespace(constant=True), "time_zero_step": lambda *given: sure,

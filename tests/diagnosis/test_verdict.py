@@ -113,7 +113,7 @@ def test_evidence_is_weighed_in_noise_as_large_as_what_is_left_or_where_next_to_
         rival_in_time=None,
     )
     made_up = {
-        "band_of_steps": None, "sized_models": (given, final), "free_run": SimpleNamespace(rms=1.0), "fit_of_all": None,
+        "band_of_steps": None, "sized_models": (given, final), "free_run": SimpleNamespace(rms=1.0), "fit_stated": None,
         "_drift_left_by": STANDS_STILL,
         "step_of": SimpleNamespace(coefficient=5.0, std=1.0), "ranking_of": (LEADER,),
         "_explained_by_first_effect": 0.0, "needed_share": 0.75, "_is_loud": False,

@@ -24,7 +24,7 @@ from ..selection.fitted_model import Model
 from ..selection.onset_search import select_from_the_onset
 from ..selection.search_limit import limit_text, search_is_over, search_limit
 from ..selection.selection_path import SelectionPath, up_to
-from ..selection.selection_step import band_of_steps, fit_of_all, sized_models
+from ..selection.selection_step import band_of_steps, fit_stated, sized_models
 from ..selection.thresholds import THRESHOLDS
 from ..selection.time_zero import TimeZero
 from ..selection.wrong_description import wrong_description
@@ -257,7 +257,9 @@ def _certain(added: Sequence[Addition], told: _Told) -> bool:
 
 
 def _fit_of_all(path: SelectionPath) -> Fit:
-    return fit_of_all(path.steps[: len(path.added)], path.final)
+    """That coefficients and constants are stated from: the last addition's, which has the others too."""
+    steps = path.steps[: len(path.added)]
+    return fit_stated(steps[-1], path.final) if steps else path.final.fit
 
 
 def _with_effects(structure: Structure, added: Sequence[Addition], steps: Sequence[StepReport]) -> Structure:

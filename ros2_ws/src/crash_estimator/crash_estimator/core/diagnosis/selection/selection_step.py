@@ -208,14 +208,6 @@ def band_of_steps(steps: Sequence[SelectionStep]) -> int | None:
     return band_of(steps[0].before)
 
 
-def fit_of_all(steps: Sequence[SelectionStep], final: Model) -> Fit:
-    """The fit that coefficients are stated from; steps: those whose candidates were added, final: the model with all.
-
-    Where the noise had to be taken larger, it is the last addition's own fit that is honest: it has the others too.
-    """
-    return fit_stated(steps[-1], final) if steps else final.fit
-
-
 def fit_stated(step: SelectionStep, final: Model) -> Fit:
     """The fit that a step's coefficient is stated from; final: the model with all that was added.
 
