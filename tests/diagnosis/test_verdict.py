@@ -202,8 +202,8 @@ def test_what_explains_most_is_named_though_it_leaves_more_than_noise(frontal):
     assert abs(frontal.steps[0].coefficient / 2e7 - 1.0) < 0.2
     found = frontal.as_json()
     assert found["complete"] is False and found["left"]["noise"] is False
-    assert DEFAULT.as_json() == {"of_peak": 0.01, "rating": None, "stated": False}
-    assert found["tolerance"] == HALF.as_json() == {"of_peak": 0.005, "rating": None, "stated": False}
+    assert DEFAULT._asdict() == {"of_peak": 0.01, "rating": None, "stated": False}
+    assert found["tolerance"] == HALF._asdict() == {"of_peak": 0.005, "rating": None, "stated": False}
     assert {"rms", "unit", "of_peak", "rating", "noise", "where"} <= found["left"].keys()
     assert found["left"]["of_peak"] == max(one["of_peak"] for one in found["left"]["where"]) < 0.02
     json.dumps(found)

@@ -1,6 +1,5 @@
 """The constants of the structure that a diagnosis has fitted beside the effects."""
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -20,10 +19,7 @@ class FittedConstant(NamedTuple):
 
 def fitted_constants(fitted: Fit) -> tuple[FittedConstant, ...]:
     """Of a structure's elements, in their order; a free curve has none."""
-    return tuple(_each(fitted))
-
-
-def _each(fitted: Fit) -> Iterator[FittedConstant]:
+    found = []
     elements = {element.name: element for element in fitted.layout.structure.elements}
     for link in (link for link in fitted.layout.links if link.name in elements):
         constants = [("stiffness", link.constant, "N/m"), ("damping", link.damping, "N*s/m")]
@@ -33,4 +29,5 @@ def _each(fitted: Fit) -> Iterator[FittedConstant]:
         for constant, p, unit in constants:
             if p is not None:
                 std = float(np.sqrt(fitted.covariance[p, p]))
-                yield FittedConstant(link.name, constant, float(fitted.theta[p]), std, unit)
+                found.append(FittedConstant(link.name, constant, float(fitted.theta[p]), std, unit))
+    return tuple(found)

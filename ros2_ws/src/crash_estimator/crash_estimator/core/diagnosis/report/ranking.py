@@ -76,9 +76,6 @@ class StepReport:
         form = f" ({self.form})" if self.form else ""
         return f"{self.effect}{form} on {self.target}" + (f" in {self.recording}" if self.recording else "")
 
-    def as_json(self) -> dict:
-        return vars(self)
-
 
 def stated(term: Term, fitted: Fit) -> tuple[float, float, dict[str, float]]:
     """An effect's coefficient as the literature states it, its standard deviation, and its shape constants.

@@ -5,8 +5,6 @@ from typing import NamedTuple
 from ...structure import ModelError
 from .left import Left
 
-EXAMPLES = "a rating from 0 to 1, as in 0.8, or a share of the peak, as in 5%"
-
 
 def percent(share: float, digits: int = 3) -> str:
     return f"{100.0 * share:.{digits}g} %"
@@ -30,9 +28,6 @@ class Tolerance(NamedTuple):
             return f"a rating of {self.rating:g}"
         return percent(self.of_peak) + ("" if self.stated else " (the default of --good-enough)")
 
-    def as_json(self) -> dict:
-        return self._asdict()
-
 
 DEFAULT = Tolerance(of_peak=0.01, stated=False)
 """1 % of the peak: less than two sensors on one body agree to. Of 36 development cases outside the vocabulary none left
@@ -50,4 +45,6 @@ def tolerance_of(text: str) -> Tolerance:
         return Tolerance(of_peak=value / 100.0)
     if not number.endswith("%") and 0.0 < value <= 1.0:
         return Tolerance(rating=value)
-    raise ModelError(f"what is good enough is {EXAMPLES}; got {text!r}")
+    raise ModelError(
+        f"what is good enough is a rating from 0 to 1, as in 0.8, or a share of the peak, as in 5%; got {text!r}"
+    )
