@@ -30,22 +30,12 @@ from ..selection.time_zero import TimeZero
 from ..selection.wrong_description import wrong_description
 from .fitted_constants import FittedConstant, fitted_constants
 from .left import Left, left_by
-from .ranking import Ranked, StepReport, ranking_of, step_of
+from .ranking import Ranked, Rms, StepReport, ranking_of, step_of
 from .remarks import remarks_on, with_assumed_noise
 from .time_zero_step import TIME_ZERO, as_ranked, time_zero_step
 from .tolerance import DEFAULT, Tolerance
 from .verdict import ADEQUATE, EFFECT_MISSING, UNEXPLAINED, Evidence, verdict_on
 from .verdict_text import verdict_text
-
-
-@dataclass(frozen=True)
-class Rms:
-    """Root mean square of measured minus predicted over all outputs, m/s^2; None where it is not known."""
-
-    before: float
-    after: float
-    noise_floor: float | None = None
-    unit: str = "m/s^2"
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from ..observation.noise_inflation import CFC, SLOWEST
 from ..output_error.gauss_newton import Fit
 from ..parameterization.layout import Experiment
 from ..parameterization.terms import Term
-from ..residuals.residuals import analyse, noise_floor
+from ..residuals.residuals import Residuals, analyse, noise_floor
 from ..selection.acceptance import odds_against
 from ..selection.candidate_fits import CandidateFit
 from ..selection.fitted_model import Model
@@ -20,6 +20,16 @@ from ..selection.thresholds import THRESHOLDS
 
 ACTS = 0.05
 """A barrier's force and inertias are compared while the force is above this share of its peak."""
+
+
+@dataclass(frozen=True)
+class Rms:
+    """Root mean square of measured minus predicted over all outputs, m/s^2; None where it is not known."""
+
+    before: float
+    after: float
+    noise_floor: float | None = None
+    unit: str = "m/s^2"
 
 
 @dataclass(frozen=True)
@@ -127,14 +137,18 @@ def _ranked(one: CandidateFit, before: Model, shown: list[CandidateFit]) -> Rank
         elif addition.effect.restated:
             value, std = addition.effect.stated(value, **addition.shapes), np.inf
     else:
-        left = analyse(one.fit).mean_square
-        explained = float(np.clip(1.0 - left / before.residuals.mean_square, 0.0, 1.0))
+        explained = _explained(before.residuals, analyse(one.fit))
         value, std, shape = stated(one.fit.layout.term(addition), one.fit)
     identifiable = not rivals and bool(std <= abs(value))  # whose sigma exceeds it may as well be nothing
     return Ranked(
         effect, target, value, std, addition.effect.unit, float(one.gain), explained, identifiable, rivals, shape,
         one.fit is not None, addition.variant, addition.recording,
     )  # fmt: skip
+
+
+def _explained(before: Residuals, after: Residuals) -> float:
+    """Share of the mean square residual, the noise in it too."""
+    return float(np.clip(1.0 - after.mean_square / before.mean_square, 0.0, 1.0))
 
 
 def _confounded(one: CandidateFit, other: CandidateFit) -> bool:
@@ -154,11 +168,9 @@ def step_of(
     changed = best.fit if step.before.fit.problem.noise_is_inflated else after.fit
     return StepReport(
         *best.addition.key, value, std, best.addition.effect.unit, float(best.gain),
-        explained=float(np.clip(1.0 - after.residuals.mean_square / before.residuals.mean_square, 0.0, 1.0)),
+        explained=_explained(before.residuals, after.residuals),
         shape=shape,
-        residual_rms={
-            "before": before.residuals.rms, "after": after.residuals.rms, "noise_floor": floor, "unit": "m/s^2",
-        },
+        residual_rms=vars(Rms(before.residuals.rms, after.residuals.rms, floor)),
         free_run_rms={"before": free_run_rms[0], "after": free_run_rms[1]},
         force_explained=_force_explained(step.before.fit, changed),
         form=best.addition.variant,

@@ -8,7 +8,7 @@ from ..residuals.residuals import noise_floor
 from ..selection.fitted_model import Model
 from ..selection.onset_search import Begun
 from ..selection.time_zero import TimeZero
-from .ranking import Ranked, StepReport
+from .ranking import Ranked, Rms, StepReport
 
 TIME_ZERO = "time_zero"
 """As the steps name it: no effect of a model but an error of a recording, mended by `import --time-zero S`."""
@@ -32,7 +32,7 @@ def time_zero_step(zero: TimeZero, moved: Model, free_run_rms: tuple[float, floa
         zero.gain(moved),
         explained=float(np.clip(1.0 - (found / stated) ** 2, 0.0, 1.0)),
         shape={shift.test: shift.seconds for shift in zero.shifts} if len(zero.shifts) > 1 else {},
-        residual_rms={"before": stated, "after": found, "noise_floor": floor, "unit": "m/s^2"},
+        residual_rms=vars(Rms(stated, found, floor)),
         free_run_rms={"before": free_run_rms[0], "after": free_run_rms[1]},
         force_explained={},
     )
