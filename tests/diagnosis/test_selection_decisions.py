@@ -12,6 +12,7 @@ from crash_estimator.core.diagnosis.report import diagnosis as report
 from crash_estimator.core.diagnosis.selection import assumptions, fitted_model, pair_search, selection_path
 from crash_estimator.core.diagnosis.selection.acceptance import needed_gain
 from crash_estimator.core.diagnosis.selection.fitted_model import forces_jump
+from crash_estimator.core.diagnosis.selection.score_screening import Screened
 from crash_estimator.core.diagnosis.selection.thresholds import THRESHOLDS
 
 
@@ -152,18 +153,19 @@ def test_of_candidates_of_an_update_some_are_tried_whatever_time_they_take(monke
     """The leaders, or the first of them at every other update, and the one whose turn it is."""
     made = []
     monkeypatch.setattr(candidate_turns, "_screened", lambda *given: ())
-    monkeypatch.setattr(candidate_turns, "shortlist", lambda *given: [SimpleNamespace(addition=addition("friction"))])
+    monkeypatch.setattr(candidate_turns, "shortlist", lambda *given: [Screened(addition("friction"), 5.0, 1.0, 1.0)])
     monkeypatch.setattr(candidate_turns, "_variant", lambda magnitudes, addition, turn: addition)
-    monkeypatch.setattr(candidate_turns, "_tried", lambda s, m, b, addition, one: made.append(addition) or made[-1])
-    monkeypatch.setattr(candidate_turns, "as_found", lambda tried: tried)
+    fitted = SimpleNamespace(evidence=5.0)
+    monkeypatch.setattr(candidate_turns, "_fit", lambda s, b, m, addition, one: made.append(addition) or fitted)
+    monkeypatch.setattr(candidate_turns, "as_found", lambda tried: tried.addition)
 
     def addition(name):
-        return SimpleNamespace(key=(name, "spring"), gain=5.0, fit=None, addition=SimpleNamespace(key=(name, "spring")))
+        return SimpleNamespace(key=(name, "spring"))
 
     leaders = addition("damping"), addition("gap")
     gains = {leader.key: 5.0 for leader in leaders}
     state = candidate_turns.OnlineState(updates, leaders, gains)
-    before = SimpleNamespace(additions=(), fit=None)
+    before = SimpleNamespace(additions=(), fit=SimpleNamespace(evidence=0.0))
     candidate_turns.try_some(state, None, {}, before, lambda: late)
     assert len(made) == tried
 

@@ -67,7 +67,8 @@ def try_some(
     found: list[CandidateFit] = []
     for addition, one in chosen:
         if len(found) < fewest or not out_of_time():
-            found.append(_tried(state, magnitudes, before, addition, one))
+            fitted = _fit(state, before, magnitudes, addition, one)
+            found.append(CandidateFit(addition, fitted.evidence - before.fit.evidence, fitted))
     now = sorted((tried for tried in found if np.isfinite(tried.gain)), key=lambda tried: -tried.gain)
     gains = {**state.gains, **{tried.addition.key: tried.gain for tried in now}}
     turns = {**state.turns, **{tried.addition.key: state.updates for tried in found}}
@@ -94,25 +95,16 @@ def _variant(magnitudes: Magnitudes, addition: Addition, turn: int) -> Addition:
     return variants[turn % len(variants)]
 
 
-def _tried(
-    state: OnlineState, magnitudes: Magnitudes, before: Model, addition: Addition, screened: Screened | None
-) -> CandidateFit:
-    fitted = _fit(state, before, magnitudes, addition, screened)
-    return CandidateFit(addition, fitted.evidence - before.fit.evidence, fitted)
-
-
 def _rest(screened: Sequence[Screened], now: Sequence[CandidateFit], gains: Mapping[Key, float]) -> list[CandidateFit]:
     """Those not fitted now: as they were when last fitted, the others below them; a screened gain is an estimate."""
     most = now[0].gain if now else np.inf
     least = max(min(gains.values(), default=np.inf), 0.0)
-    rest: dict[Key, CandidateFit | None] = {tried.addition.key: None for tried in now}
-    for one in screened:
-        key = one.addition.key
-        if key not in rest:
-            rest[key] = CandidateFit(
-                one.addition, min(gains[key], most) if key in gains else min(one.gain, least), None, one
-            )
-    return sorted((tried for tried in rest.values() if tried), key=lambda tried: -tried.gain)
+    fitted, rest = {tried.addition.key for tried in now}, []
+    for one in shortlist(screened, len(screened)):
+        if (key := one.addition.key) not in fitted:
+            gain = min(gains[key], most) if key in gains else min(one.gain, least)
+            rest.append(CandidateFit(one.addition, gain, None, one))
+    return sorted(rest, key=lambda one: -one.gain)
 
 
 def _fit(
