@@ -76,7 +76,7 @@ def test_whether_doubts_leave_noise_is_asked_no_further_than_twice_the_noise(mon
     monkeypatch.setattr(assumptions, "_with_curves_as_fine_as_needed", lambda *args: path)
     monkeypatch.setattr(assumptions, "_leaves_noise", lambda model: False)
     monkeypatch.setattr(assumptions, "_in_doubt", lambda doubted, model, hopeless=np.inf: asked.append(hopeless))
-    assert assumptions._as_exact_as_needed(None, records, {}) is path
+    assert assumptions._as_exact_as_needed(None, records, {}, lambda begun: False) is path
     assert asked == [100.0 * THRESHOLDS.near_floor] * 2, "of the model as given, and of the final one"
 
 

@@ -22,6 +22,9 @@ class Change(NamedTuple):
     after: float
 
 
+UNKNOWN = Change(np.nan, np.nan)
+
+
 class FitCurves(NamedTuple):
     """Measured and fitted outputs of one model on one recording: n samples of q outputs."""
 
@@ -48,14 +51,14 @@ class OnlineAnswer(NamedTuple):
     fits: tuple[FitCurves, ...]  # of the model as it is, then with each effect that was found
     final: bool = False
     force: str = ""  # channel of the measured force, where the share that all inertias explain is known
-    force_explained: Change = Change(np.nan, np.nan)  # with the first of what was found
+    force_explained: Change = UNKNOWN  # with the first of what was found
 
 
 def final_answer(found: Diagnosis) -> OnlineAnswer:
     """The offline answer; of its recordings the first is the one that is replayed."""
     first, last = found.models[0], found.models[-1]
     effects = found.structure.effects[len(first.fit.layout.structure.effects) :]
-    force, share = next(iter(found.steps[0].force_explained.items() if found.steps else ()), ("", {}))
+    force, share = next(iter(found.steps[0].force_explained.items() if found.steps else ()), ("", UNKNOWN._asdict()))
     return OnlineAnswer(
         verdict=found.verdict,
         complete=found.complete,
@@ -72,7 +75,7 @@ def final_answer(found: Diagnosis) -> OnlineAnswer:
         ),
         final=True,
         force=force,
-        force_explained=Change(**share) if share else Change(np.nan, np.nan),
+        force_explained=Change(**share),
     )
 
 

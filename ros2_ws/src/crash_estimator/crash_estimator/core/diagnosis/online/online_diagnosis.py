@@ -34,7 +34,7 @@ from ..selection.fitted_model import Model
 from ..selection.rare_effects import common_effects
 from ..selection.selection_step import SelectionStep
 from .candidate_turns import ITERATIONS_ON, MOST_ITERATIONS, OnlineState, try_some
-from .online_answer import Change, OnlineAnswer, curves
+from .online_answer import UNKNOWN, Change, OnlineAnswer, curves
 from .warm_start import carried_on
 
 CELLS_IN_ALL = 90
@@ -98,7 +98,7 @@ class OnlineDiagnosis:
             ranking=ranking_of(done),
             found=found,
             rms=Change(*(_rms(layout, full, each) for each in (finely[0], finely[-1]))),
-            free_run=Change(np.nan, np.nan),
+            free_run=UNKNOWN,
             noise_floor=noise_floor(layout, full),
             white=(given.residuals.band_test, residuals.band_test),
             misfit=misfit_windows(layout, records[:1], given.residuals),

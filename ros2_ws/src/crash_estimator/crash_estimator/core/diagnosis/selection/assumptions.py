@@ -107,7 +107,7 @@ def _selected(structure: Structure, records: Sequence[ObservedRecord], effects: 
 
 def _as_exact_as_needed(
     structure: Structure, records: Sequence[ObservedRecord], effects: Mapping[str, Effect],
-    elsewhere: Callable[[SelectionPath], bool] = lambda path: False,
+    elsewhere: Callable[[SelectionPath], bool],
 ) -> SelectionPath:  # fmt: skip
     """Masses and zeros are as stated, unless nothing but noise is left with errors of them such as scales and sensors
     have: by the model as given, or with fewer effects than were found.

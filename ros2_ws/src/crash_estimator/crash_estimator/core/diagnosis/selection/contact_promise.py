@@ -29,7 +29,7 @@ def promised_by(other: Structure, path: SelectionPath, likely: Iterable[tuple[Se
     Taken the wrong way, a damper that pulls looks like another effect. likely: the path's `likely_first`.
     """
     final, records = path.final, path.records
-    if other == path.structure or (not path.added and final.white):
+    if not path.added and final.white:
         return -np.inf
     magnitudes = measure_magnitudes(other, records, path.cells)
     found = ((model.additions, in_the_sensors_noise(model, records)) for model in models_of(path.steps, final))
