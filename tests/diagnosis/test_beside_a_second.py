@@ -55,7 +55,7 @@ def asked_for(monkeypatch, explains, quieter, gain):
         "band_of_steps": lambda path: 60,
         "as_fitted": lambda before, best: model(100.0, 1),
         "share_explained": lambda before, larger, band: explains,
-        "in_recorded_noise": lambda m, e, larger, path: fitted.append("second") or "second",
+        "in_recorded_noise": lambda m, e, larger: fitted.append("second") or "second",
         "_noise_left_by": lambda second, records: quieter,
         "_quietness": lambda records: records or 0.0,
         "_in_larger_noise": lambda m, e, recorded, noise, found: fitted.append("again") or step(model(500.0), gain),

@@ -166,7 +166,7 @@ def one_by_one(
     monkeypatch.setattr(forward_selection, "common_effects", lambda *given: {})
     monkeypatch.setattr(forward_selection, "is_rare", lambda addition: rare)
     monkeypatch.setattr(forward_selection, "effects_beside", lambda *given: {})
-    monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda m, e, before, path: search(before))
+    monkeypatch.setattr(forward_selection, "in_recorded_noise", lambda m, e, before: search(before))
     monkeypatch.setattr(forward_selection, "only_screened", lambda m, e, before, doubted: SelectionStep(before, []))
     monkeypatch.setattr(SelectionStep, "leaves_noise", property(white))
     monkeypatch.setattr(forward_selection, "as_fitted", lambda before, found: None)

@@ -21,7 +21,7 @@ CARE = ["along", "slowly", "other_variants", "anew", "profile"]
 
 
 @pytest.mark.parametrize(
-    ("out_of_reach", "explains_most", "earlier", "left", "tried"),
+    ("out_of_reach", "explains_most", "found", "left", "tried"),
     [
         (False, True, (), 50.0, CARE),
         (False, False, (), 50.0, [CARE[1], CARE[-1]]),
@@ -34,7 +34,7 @@ CARE = ["along", "slowly", "other_variants", "anew", "profile"]
     ],
 )
 def test_care_is_taken_within_reach_of_noise_and_with_a_further_effect_where_most_is_explained(
-    monkeypatch, out_of_reach, explains_most, earlier, left, tried
+    monkeypatch, out_of_reach, explains_most, found, left, tried
 ):
     """What explains less is fitted neither in other ways nor anew, but of a real structure."""
     called = []
@@ -42,12 +42,10 @@ def test_care_is_taken_within_reach_of_noise_and_with_a_further_effect_where_mos
     class Search:
         def __init__(self, *given):
             self.profile = lambda: called.append("profile")
+            self.from_motion = self.from_model = lambda given: None  # are done whatever is found
 
         def __getattr__(self, name):
             return lambda *given: called.append(name)
-
-        def go_on_from(self, given):
-            called.clear()  # what comes before is done whatever is found
 
         out_of_reach = staticmethod(lambda: out_of_reach)
         explains_most = staticmethod(lambda: explains_most)
@@ -58,8 +56,8 @@ def test_care_is_taken_within_reach_of_noise_and_with_a_further_effect_where_mos
     monkeypatch.setattr(candidate_fits, "candidates", lambda *given: ())
     monkeypatch.setattr(candidate_fits, "screen", lambda *given: [])
     monkeypatch.setattr(candidate_fits, "search_is_over", lambda: False)
-    before = model(mean_square=left)
-    assert candidate_fits.fit_candidates(None, {}, before, thorough=True, earlier=earlier) == tried
+    before = model(mean_square=left, additions=found)
+    assert candidate_fits.fit_candidates(None, {}, before, thorough=True) == tried
 
 
 @pytest.mark.parametrize(("white", "asked"), [(False, ["hardly screened", "along"]), (True, ["hardly screened"])])

@@ -39,19 +39,18 @@ def screen_candidates(magnitudes: Magnitudes, effects: Mapping[str, Effect], mod
 
 def fit_candidates(
     magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, thorough: bool = False,
-    in_other_noise: Sequence[CandidateFit] = (), earlier: Sequence[CandidateFit] = (), least: float = np.inf,
+    in_other_noise: Sequence[CandidateFit] = (), least: float = np.inf,
 ) -> list[CandidateFit]:  # fmt: skip
     """All candidates, best first; one for each effect and target.
 
-    thorough: fit the best of them harder, where none of the most likely ones leaves white noise. in_other_noise: what
-    was found with other noise, best first; its best fits are gone on from, and of what a real structure leaves the best
-    ones are fitted anew: a fit ends there in one of several minima, and which one it was decided, with the last digit
-    of a sample, what led. earlier: what was found for the models before this one: beside what was found, only what
-    explains most is fitted harder. least: as of `begin`.
+    thorough: fit the best of them harder, where none of the most likely ones leaves white noise. in_other_noise, where
+    not thorough: what was found with other noise, best first; its best fits are gone on from, and of what a real
+    structure leaves the best ones are fitted anew: a fit ends there in one of several minima, and which one it was
+    decided, with the last digit of a sample, what led. least: as of `begin`.
     """
     search = begin(magnitudes, effects, model, least)
     if thorough:
-        fit_harder(search, model, in_other_noise, earlier)
+        fit_harder(search, model, beside=bool(model.found))
     else:
         search.go_on_from(in_other_noise)
         if model.residuals.mean_square >= THRESHOLDS.real_structure:
@@ -72,12 +71,9 @@ def begin(magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, l
     return search
 
 
-def fit_harder(
-    search: "_Search", model: Model, in_other_noise: Sequence[CandidateFit] = (), earlier: Sequence[CandidateFit] = ()
-) -> None:
-    """Go on with a search that has begun, as `fit_candidates` says."""
-    search.go_on_from(in_other_noise)
-    nothing_left = model.white and earlier  # to stand for what was added, it would have had to explain all alone
+def fit_harder(search: "_Search", model: Model, beside: bool = False) -> None:
+    """Go on with a search that has begun; beside: what was found, where only what explains most is fitted harder."""
+    nothing_left = model.white and beside  # to stand for what was added, it would have had to explain all alone
     if model.residuals.mean_square < THRESHOLDS.near_floor and not nothing_left:
         search.from_motion(search.bending())
     if not model.white:
@@ -90,7 +86,7 @@ def fit_harder(
             if search.explains_most():
                 if search.out_of_reach():
                     break
-            elif earlier or harder not in of_little:
+            elif beside or harder not in of_little:
                 continue
             harder()
     if not search_is_over() and search.reached_the_floor():

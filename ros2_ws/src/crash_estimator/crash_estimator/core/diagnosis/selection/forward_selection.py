@@ -121,7 +121,7 @@ def _next_step(
     only_to_noise = len(found) >= THRESHOLDS.most_at_once or rare
     far_from_noise = model.residuals.mean_square >= THRESHOLDS.real_structure
     if not (only_to_noise and far_from_noise):
-        step = in_recorded_noise(magnitudes, effects, model, path)
+        step = in_recorded_noise(magnitudes, effects, model)
         tried = step.candidates[:1]
         step = elsewhere_than(magnitudes, rare, step) if rare else step
         in_vain = only_to_noise or (found and not far_from_noise and _all_explain_less(step, THRESHOLDS.some, path))

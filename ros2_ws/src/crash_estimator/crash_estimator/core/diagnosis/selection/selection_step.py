@@ -53,16 +53,10 @@ class SelectionStep(NamedTuple):
         return share_removed(self.before.residuals, analyse(self.best.fit)) if self.best else 0.0
 
 
-def in_recorded_noise(
-    magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, path: Sequence[SelectionStep] = ()
-) -> SelectionStep:
-    """All candidates against the sensors' noise; path: the steps before.
-
-    With care where one would be believed beside those that were found, whatever it leaves.
-    """
-    earlier = [one for step in path for one in step.candidates]
-    thorough = len(path) < THRESHOLDS.most_at_once
-    found = fit_candidates(magnitudes, effects, model, thorough, earlier=earlier)
+def in_recorded_noise(magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model) -> SelectionStep:
+    """All candidates against the sensors' noise, with care where one would be believed beside those that were found,
+    whatever it leaves."""
+    found = fit_candidates(magnitudes, effects, model, thorough=len(model.found) < THRESHOLDS.most_at_once)
     return SelectionStep(model, found, found)
 
 
@@ -118,7 +112,7 @@ def weighed_beside_a_second(
     larger = as_fitted(model, recorded.best)
     if share_explained(model, larger, band) < THRESHOLDS.half:
         return done
-    noise = _noise_left_by(in_recorded_noise(magnitudes, effects, larger, [recorded]), model.records)
+    noise = _noise_left_by(in_recorded_noise(magnitudes, effects, larger), model.records)
     if _quietness(noise) < _quietness(done.before.records) + THRESHOLDS.same_noise:
         return done
     again = _in_larger_noise(magnitudes, effects, recorded, noise, recorded.candidates)
