@@ -166,7 +166,7 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
         if first.verdict == EFFECT_MISSING:  # what came after it is no reason to doubt it
             return first
     final = told.final
-    floor = noise_floor(given.fit.layout, given.records)
+    size = Rms(given.residuals.rms, final.residuals.rms, noise_floor(given.fit.layout, given.records))
     return Diagnosis(
         verdict=verdict.word,
         complete=verdict.complete,
@@ -174,8 +174,8 @@ def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zer
         left_before=evidence.before,
         noise=evidence.noise and not evidence.loud,
         tolerance=tolerance,
-        text=verdict_text(verdict, evidence, tolerance, told.steps, given, final, floor, structure),
-        residual_rms=Rms(given.residuals.rms, final.residuals.rms, floor),
+        text=verdict_text(verdict, evidence, tolerance, told.steps, final, size, structure),
+        residual_rms=size,
         free_run_rms=Rms(told.runs[0], told.runs[-1]),
         ranking=told.ranking,
         steps=told.steps,

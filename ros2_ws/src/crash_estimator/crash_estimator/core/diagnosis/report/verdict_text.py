@@ -10,7 +10,7 @@ from ...structure_parts import ALL, SPRINGS
 from ..selection.fitted_model import Model
 from ..selection.thresholds import THRESHOLDS
 from .left import Left, vibration_of
-from .ranking import StepReport
+from .ranking import Rms, StepReport
 from .time_zero_step import TIME_ZERO, signals_begin
 from .tolerance import Tolerance, percent
 from .verdict import ADEQUATE, EFFECT_MISSING, Evidence, Verdict, doubt_of
@@ -20,17 +20,16 @@ LASTING = {SPRINGS: "elastic forces that act on", ALL: "all forces that act on, 
 
 
 def verdict_text(
-    verdict: Verdict, evidence: Evidence, tolerance: Tolerance, steps: Sequence[StepReport], first: Model,
-    final: Model, floor: float, structure: Structure,
+    verdict: Verdict, evidence: Evidence, tolerance: Tolerance, steps: Sequence[StepReport], final: Model, size: Rms,
+    structure: Structure,
 ) -> str:  # fmt: skip
-    """first, final: the model as given and with what was added; floor: RMS of the sensors' noise, m/s^2; structure: as
-    the model file says."""
+    """final: the model with what was added; size: of the residuals; structure: as the model file says."""
     if verdict.word == ADEQUATE:
-        said = f"adequate: {_adequate(evidence, tolerance, final, floor)}"
+        said = f"adequate: {_adequate(evidence, tolerance, final, size)}"
     elif verdict.word == EFFECT_MISSING:
-        said = f"effect missing: {_missing(evidence, tolerance, steps, first, final, floor)}"
+        said = f"effect missing: {_missing(evidence, tolerance, steps, final, size)}"
     else:
-        said = f"unexplained: {_unexplained(evidence, tolerance, steps, first, final, floor)}"
+        said = f"unexplained: {_unexplained(evidence, tolerance, steps, final, size)}"
     below = final.records[0].below
     if below < float("inf"):
         said += f"; what rings above {below:g} Hz, {vibration_of(final) / G:.3g} g, is left out"
@@ -67,8 +66,8 @@ def _masses_otherwise(final: Model) -> list[str]:
     return [f"{' and '.join(words)} than stated"] if words else []
 
 
-def _adequate(evidence: Evidence, tolerance: Tolerance, final: Model, floor: float) -> str:
-    left = f"residual RMS {final.residuals.rms / G:.3g} g, noise floor {floor / G:.3g}"
+def _adequate(evidence: Evidence, tolerance: Tolerance, final: Model, size: Rms) -> str:
+    left = f"residual RMS {size.after / G:.3g} g, noise floor {size.noise_floor / G:.3g}"
     if not evidence.noise:
         return f"{_what_is_left(evidence.after)}, is within {tolerance.text} ({left})"
     until = (
@@ -77,17 +76,17 @@ def _adequate(evidence: Evidence, tolerance: Tolerance, final: Model, floor: flo
     return f"nothing significant is missing ({left}){until}"
 
 
-def _missing(evidence: Evidence, tolerance: Tolerance, steps, first: Model, final: Model, floor: float) -> str:
+def _missing(evidence: Evidence, tolerance: Tolerance, steps: Sequence[StepReport], final: Model, size: Rms) -> str:
     rivals, advice = evidence.ranking[0].confounded_with if evidence.ranking else (), ""
     if rivals:
         advice = f"; this cannot be told from {', '.join(rivals)}"
-        advice += " on one recording: record another speed" if len(first.records) == 1 else " on these recordings"
+        advice += " on one recording: record another speed" if len(final.records) == 1 else " on these recordings"
     if evidence.noise:
-        small = first.residuals.rms < THRESHOLDS.near_floor**0.5 * floor
+        small = size.before < THRESHOLDS.near_floor**0.5 * size.noise_floor
         why = f"; small, yet noise would not leave it ({steps[0].evidence:.0f} nats of evidence)" if small else ""
         more = "" if tolerance.admits(evidence.after) else ", beyond which more than noise is left: incomplete"
         white = f"now white{_in_the_band(final)}{more if evidence.loud else ''}"
-        return f"{_names(steps)}; {_size(first, final, floor)}, {white}{why}{advice}"
+        return f"{_names(steps)}; {_told(size)}, {white}{why}{advice}"
     within = tolerance.admits(evidence.after)
     grade = f"is within {tolerance.text}" if within else f"is more than {tolerance.text}, and is no noise: incomplete"
     explains = f"{'it' if len(steps) == 1 else 'they'} {_explained(steps, evidence)}"
@@ -100,17 +99,17 @@ def _in_the_band(model: Model) -> str:
     return f" below {passed:.0f} Hz, up to where the sensors' filters show it" if passed < float("inf") else ""
 
 
-def _unexplained(evidence: Evidence, tolerance: Tolerance, steps, first: Model, final: Model, floor: float) -> str:
-    names, size, drift, varying = _names(steps), _size(first, final, floor), evidence.drift, evidence.varying
+def _unexplained(evidence: Evidence, tolerance: Tolerance, steps: Sequence[StepReport], final: Model, size: Rms) -> str:
+    names, sizes, drift, varying = _names(steps), _told(size), evidence.drift, evidence.varying
     if varying:
         better = f"{names}: no better than" if names else "no candidate explains what is left as well as"
-        return f"{size}; {better} {varying.what} that varies with time, with {varying.explained:.0%} of the misfit"
+        return f"{sizes}; {better} {varying.what} that varies with time, with {varying.explained:.0%} of the misfit"
     if evidence.white and drift.constant:  # several effects together
-        return f"{names} together leave only noise; {size}; one effect of another kind is likelier than so many"
+        return f"{names} together leave only noise; {sizes}; one effect of another kind is likelier than so many"
     along = f"{drift.what} that varies with time, as no candidate does"
     if evidence.white:
         given = f"with {names} it looks white" if steps else "it looks white"
-        return f"{given}; {size}; yet what is left goes along with {along}"
+        return f"{given}; {sizes}; yet what is left goes along with {along}"
     worst, within = final.residuals.band_test.worst, tolerance.admits(evidence.after)
     layout = final.fit.layout
     where = (
@@ -121,7 +120,7 @@ def _unexplained(evidence: Evidence, tolerance: Tolerance, steps, first: Model, 
     left = f"no candidate explains what is left, most of it in {where}"
     varies = drift.share > THRESHOLDS.some and not drift.constant
     also = f"; {drift.share:.0%} of it goes along with {along}" if varies else ""
-    return f"{done}{size}; {left}{also}"
+    return f"{done}{sizes}; {left}{also}"
 
 
 def _names(steps: Sequence[StepReport]) -> str:
@@ -133,8 +132,8 @@ def _explained(steps: Sequence[StepReport], evidence: Evidence) -> str:
     return f"{'explains' if len(steps) == 1 else 'explain'} {share:.0%} of the misfit"
 
 
-def _size(first: Model, final: Model, floor: float) -> str:
-    return f"residual RMS {first.residuals.rms / G:.3g} -> {final.residuals.rms / G:.3g} g, noise floor {floor / G:.3g}"
+def _told(size: Rms) -> str:
+    return f"residual RMS {size.before / G:.3g} -> {size.after / G:.3g} g, noise floor {size.noise_floor / G:.3g}"
 
 
 def _fall(evidence: Evidence) -> str:
