@@ -173,7 +173,7 @@ def _with_curves_as_fine_as_needed(
         if much_less:
             return begun._replace(whole=True)
     steps, final = forward_selection(magnitudes, effects, given, first)
-    as_recorded = in_the_sensors_noise(sized_models(steps, final)[-1], records)
+    searched, as_recorded = final, in_the_sensors_noise(sized_models(steps, final)[-1], records)
     finer = measure_magnitudes(structure, records, FINER_CELLS)
     mimicked = final.white and not drift_of(as_recorded).constant
     if not search_is_over() and _wants_finer_curves(final, mimicked, analyse(as_recorded), finer):
@@ -183,10 +183,9 @@ def _with_curves_as_fine_as_needed(
         fewer = len(finer_final.additions) < len(final.additions) or not final.white
         if finer_final.white and (fewer or (mimicked and drift_of(finer_final.fit).constant)):
             steps, final, cells = finer_steps, finer_final, finer.cells
-            as_recorded = in_the_sensors_noise(sized_models(steps, final)[-1], records)
-    steps, reported = up_to_the_least_error(steps, final)
-    if reported is not final:
-        final, as_recorded = reported, in_the_sensors_noise(sized_models(steps, reported)[-1], records)
+    steps, final = up_to_the_least_error(steps, final)
+    if final is not searched:
+        as_recorded = in_the_sensors_noise(sized_models(steps, final)[-1], records)
     return SelectionPath(structure, steps, final, as_recorded, records, cells)
 
 

@@ -98,9 +98,7 @@ def fit_harder(search: "_Search", model: Model, beside: bool = False) -> None:
 class _Search:
     """The best fit of each effect and target so far."""
 
-    def __init__(
-        self, magnitudes: Magnitudes, model: Model, screened: Sequence[Screened], least: float = np.inf
-    ):  # fmt: skip
+    def __init__(self, magnitudes: Magnitudes, model: Model, screened: Sequence[Screened], least: float = np.inf):
         """screened: along the model's fit."""
         self.magnitudes, self.model, self.screened = magnitudes, model, screened
         self.least = min(model.fit.cost, least)
@@ -110,10 +108,10 @@ class _Search:
         for one in screened:
             self.found.setdefault(one.addition.key, CandidateFit(one.addition, one.gain, None, one))
 
-    def from_motion(self, chosen: Iterable[Screened], schedule: Schedule = FROM_MEASURED_MOTION) -> None:
+    def from_motion(self, chosen: Iterable[Screened]) -> None:
         """Fit candidates from the measured motion."""
         for one in chosen:
-            self._fit(one.addition, None, schedule)
+            self._fit(one.addition)
             if one.addition.effect.extensions(self.magnitudes.structure, one.addition):
                 self._extended(one.addition)
 
