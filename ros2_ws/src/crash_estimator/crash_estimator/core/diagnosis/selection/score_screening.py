@@ -10,7 +10,7 @@ Along the measured motion, and with the motion's own error propagated, this need
 model without the effect would have absorbed part of it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -39,7 +39,7 @@ class Screened(NamedTuple):
 @may_diverge
 def screen(
     magnitudes: Magnitudes, records: Sequence[ObservedRecord], present: Sequence[Addition],
-    additions: Sequence[Addition], roughness=None, fitted: Fit | None = None,
+    additions: Sequence[Addition], roughness: Mapping[str, np.ndarray] | None = None, fitted: Fit | None = None,
 ) -> list[Screened]:  # fmt: skip
     """All additions to a model that has those that are present; best first. Empty where the motion has no bounds.
 
@@ -64,11 +64,10 @@ def screen(
         step = solve(base.layout, small, theta)
     except LinAlgError:  # a fit that ended in a motion without bounds: nothing can be said along it
         return []
-    factor, free = step.factor, step.free
-    scale = step.scale[free]
+    free, scale = step.free, step.scale[step.free]
     tried = np.concatenate([coefficients, wide.layout.size + np.arange(len(laws))])
     cross = normal.matrix[np.ix_(where[free], tried)] * scale[:, None]
-    inside = cho_solve(factor, cross, check_finite=False)
+    inside = cho_solve(step.factor, cross, check_finite=False)
     prior, wide_prior = base.layout.prior, wide.layout.prior
     pull = (small.vector - prior.precision @ (theta - prior.mean))[free] * scale
     b = normal.vector[tried] - inside.T @ pull
@@ -80,8 +79,8 @@ def screen(
     found = np.clip(b / precision, low, high)
     # of a coefficient that cannot be negative, prior and posterior are halves of normal distributions
     half = np.where(low == 0.0, np.log(2.0) + log_ndtr(b / np.sqrt(precision)), 0.0)
-    free = np.where(low == 0.0, np.minimum(b / precision, high), found)
-    gain = b * free - 0.5 * precision * free**2 - 0.5 * np.log(precision * std**2) + half
+    peak = np.where(low == 0.0, np.minimum(b / precision, high), found)
+    gain = b * peak - 0.5 * precision * peak**2 - 0.5 * np.log(precision * std**2) + half
     rows = zip([*additive, *laws], gain.tolist(), found.tolist(), (precision**-0.5).tolist(), strict=True)
     return sorted((Screened(*row) for row in rows), key=lambda one: -one.gain)
 

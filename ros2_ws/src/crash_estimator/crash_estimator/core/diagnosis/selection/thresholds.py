@@ -1,5 +1,5 @@
 """What the model selection believes, and how much it tries: each number with its unit, its reason, and what it was
-tuned on. A number of one module alone stands in that.
+tuned on. A number of one module alone stands in that, unless it goes with others that stand here.
 
 "Development cases" are simulated ones on seeds that no judging run uses (docs/missing-effects.md).
 """
