@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers_verdict import EVIDENCE, NOTHING_VARIES
 
 from crash_estimator.core.diagnosis.parameterization.terms import Term
 from crash_estimator.core.diagnosis.report import ranking
@@ -11,7 +12,7 @@ from crash_estimator.core.diagnosis.report.left import ChannelLeft, Left
 from crash_estimator.core.diagnosis.report.ranking import ranking_of
 from crash_estimator.core.diagnosis.report.remarks import remarks_on
 from crash_estimator.core.diagnosis.report.tolerance import DEFAULT
-from crash_estimator.core.diagnosis.report.verdict import Evidence, verdict_on
+from crash_estimator.core.diagnosis.report.verdict import verdict_on
 from crash_estimator.core.diagnosis.selection.candidate_fits import CandidateFit
 from crash_estimator.core.diagnosis.selection.thresholds import THRESHOLDS
 from crash_estimator.core.effects import EFFECTS
@@ -65,8 +66,7 @@ def test_a_ranking_has_no_effect_that_is_nothing_stated_as_one_over_it(monkeypat
 @pytest.mark.parametrize(("added", "word"), [(0, "unexplained"), (1, "effect_missing")])
 def test_noise_is_not_all_that_is_left_where_a_body_runs_away(added, word):
     left = SimpleNamespace(of_peak=3.0, is_less_than_noise=True, astray=["axis_x"])
-    drift = SimpleNamespace(constant=True, share=0.0)
-    verdict = verdict_on(Evidence(added, True, drift, left, left, (), False, True), DEFAULT)
-    assert verdict == (word, False)
+    evidence = EVIDENCE._replace(added=added, white=True, drift=NOTHING_VARIES, ranking=(), before=left, after=left)
+    assert verdict_on(evidence, DEFAULT) == (word, False)
     inside = SimpleNamespace(of_peak=3.0, is_less_than_noise=True, astray=[])
-    assert verdict_on(Evidence(added, True, drift, inside, inside, (), False, True), DEFAULT).complete
+    assert verdict_on(evidence._replace(before=inside, after=inside), DEFAULT).complete

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import yaml
+from helpers_verdict import EVIDENCE, NOTHING_VARIES
 from scipy.signal import lfilter
 
 from crash_estimator.benchmarks.second_judge import judge, right
@@ -15,7 +16,7 @@ from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.core.diagnosis.observation.rest import rests_of
 from crash_estimator.core.diagnosis.observation.whitening import filtered, weights
 from crash_estimator.core.diagnosis.report.tolerance import DEFAULT
-from crash_estimator.core.diagnosis.report.verdict import Evidence, verdict_on
+from crash_estimator.core.diagnosis.report.verdict import verdict_on
 from crash_estimator.core.noise_spectrum import NoiseSpectrum
 from crash_estimator.core.sensor_noise import sensor_noise
 from crash_estimator.model_file import ModelFile
@@ -180,6 +181,6 @@ def test_that_it_is_assumed_is_said(kept, said):
 ])  # fmt: skip
 def test_a_model_is_not_adequate_for_leaving_less_than_a_noise_that_is_assumed(assumed, of_peak, word):
     left = SimpleNamespace(of_peak=of_peak, is_less_than_noise=True, astray=[])
-    constant = SimpleNamespace(constant=True, share=0.0)
-    evidence = Evidence(0, True, constant, left, left, (), False, True, assumed=assumed)
+    only_noise = EVIDENCE._replace(white=True, drift=NOTHING_VARIES, before=left, after=left)
+    evidence = only_noise._replace(added=0, ranking=(), assumed=assumed)
     assert verdict_on(evidence, DEFAULT).word == word

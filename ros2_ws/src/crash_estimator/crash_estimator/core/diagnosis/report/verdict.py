@@ -27,12 +27,12 @@ class Evidence(NamedTuple):
     ranking: Sequence[Ranked]  # of the first step
     weighed: bool  # the evidence was taken in a noise as large as what is left
     certain: bool  # every coefficient that was added is beyond its standard deviation, and short of its limits
-    by_first: float = 0.0  # share of the misfit in the band that the first effect explains, wherever it is missing
-    needed: float = THRESHOLDS.most  # share that all of them must explain
-    place_of: Callable[[str], Hashable] = str  # what two targets have in common that are the same place
-    assumed: bool = False  # the noise is, of some channel: to be less than it says little
-    varying: Varying | None = None  # with time, and as likely as what was found
-    loud: bool = False  # what is left is more than noise above the frequencies that the sensors' filters show
+    by_first: float  # share of the misfit in the band that the first effect explains, wherever it is missing
+    needed: float  # share that all of them must explain
+    place_of: Callable[[str], Hashable]  # what two targets have in common that are the same place
+    assumed: bool  # the noise is, of some channel: to be less than it says little
+    varying: Varying | None  # with time, and as likely as what was found
+    loud: bool  # what is left is more than noise above the frequencies that the sensors' filters show
 
     @property
     def noise(self) -> bool:
