@@ -129,7 +129,7 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
             columns.append(beside.gate * rate)
         for term in link.parallel:
             c = theta[term.coefficient]
-            f = _physics(term).force(motion, **term.shapes_at(theta))
+            f = term.along(motion, theta)
             beside = crushed if link.outlasts(term.addition.effect) else contact
             parameters.append(term.coefficient)
             columns.append(beside.gate * f)
@@ -185,15 +185,10 @@ def _law(link: Link, theta: np.ndarray) -> Law:
     return law
 
 
-def _physics(term: Term) -> Any:
-    """Its effect, with the function that those of its kind have: `force`, `memory` or `factor`."""
-    return term.addition.effect
-
-
 def _inside(term: Term, theta: np.ndarray, at: np.ndarray) -> _Inside:
     nothing, c = np.zeros_like(at), theta[term.coefficient]
     motion = ElementMotion(nothing, at, nothing, at, nothing)
-    f = _physics(term).force(motion, **term.shapes_at(theta))
+    f = term.along(motion, theta)
     slope, _, by_shape = _slopes(term, theta, motion, f)
     parameters = [term.coefficient, *term.shapes.values()]
     return _Inside(c * f, c * slope, parameters, [f, *(c * each for each in by_shape)])
@@ -202,7 +197,8 @@ def _inside(term: Term, theta: np.ndarray, at: np.ndarray) -> _Inside:
 def _remembered(term: Term, link: Link, theta, time, x, beside: _Beside, parameters, columns) -> list[Memory]:
     """c z is added to the forces beside the spring, derivatives are appended -> its memory, where c z is something."""
     c, shapes = theta[term.coefficient], term.shapes_at(theta)
-    memory = partial(_physics(term).memory, np.concatenate([time[:1], time]), form=term.addition.variant)
+    effect: Any = term.addition.effect  # of the kind that has a memory
+    memory = partial(effect.memory, np.concatenate([time[:1], time]), form=term.addition.variant)
     crush = np.concatenate([[0.0], x if link.tension else np.maximum(x, 0.0)])
     z, kept, by_crush, by_before = (each[1:] for each in memory(crush, 0.0, **shapes))
     gate = beside.gate
@@ -220,23 +216,21 @@ def _remembered(term: Term, link: Link, theta, time, x, beside: _Beside, paramet
 
 def _slopes(term: Term, theta: np.ndarray, motion: ElementMotion, force: np.ndarray):
     """Of an effect's force (g,), by crush and rate, and its derivatives by the logarithm of each shape constant."""
-    effect, shapes = _physics(term), term.shapes_at(theta)
-
-    def shifted(sign):
-        return effect.force(motion._replace(crush=motion.crush + sign * SMALL_CRUSH), **shapes)
-
-    def faster(sign):
-        return effect.force(motion._replace(rate=motion.rate + sign * SMALL_RATE), **shapes)
-
-    fx = 0.0 if effect.of_rate_only else (shifted(1.0) - shifted(-1.0)) / (2.0 * SMALL_CRUSH)
-    fv = 0.0 if effect.of_crush_only else (faster(1.0) - faster(-1.0)) / (2.0 * SMALL_RATE)
-    return fx, fv, term.by_shapes(theta, force, lambda **shapes: effect.force(motion, **shapes))
+    effect = term.addition.effect
+    fx = 0.0 if effect.of_rate_only else _slope(term, theta, motion, "crush", SMALL_CRUSH)
+    fv = 0.0 if effect.of_crush_only else _slope(term, theta, motion, "rate", SMALL_RATE)
+    return fx, fv, term.by_shapes(theta, force, lambda **shapes: effect.along(motion, **shapes))
 
 
 def _factor(term: Term, theta: np.ndarray, motion: ElementMotion):
     """h, dh/dV, and its derivatives by the logarithm of each shape constant."""
-    effect, shapes = _physics(term), term.shapes_at(theta)
-    up, down = (effect.along(motion._replace(rate=motion.rate + v), **shapes) for v in (FACTOR_RATE, -FACTOR_RATE))
-    factor = effect.along(motion, **shapes)
+    effect, factor = term.addition.effect, term.along(motion, theta)
     by_shape = term.by_shapes(theta, factor, lambda **shapes: effect.along(motion, **shapes))
-    return factor, (up - down) / (2.0 * FACTOR_RATE), by_shape
+    return factor, _slope(term, theta, motion, "rate", FACTOR_RATE), by_shape
+
+
+def _slope(term: Term, theta: np.ndarray, motion: ElementMotion, by: str, step: float) -> np.ndarray:
+    """(g,) of an effect's function of the motion, by its "crush" or its "rate": a central difference."""
+    changed = (motion._replace(**{by: getattr(motion, by) + change}) for change in (step, -step))
+    up, down = (term.along(each, theta) for each in changed)
+    return (up - down) / (2.0 * step)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...effects.effect import Addition, Effect
+from ...effects.effect import Addition, Effect, ElementMotion
 from ...effects.kinds.element_force import OF_THE_CURVE, PLASTIC
 from ...structure_parts import NOTHING, outlasts
 from .free_curve import Curve
@@ -27,6 +27,10 @@ class Term(NamedTuple):
     def shapes_at(self, theta: np.ndarray, longer: str = "") -> dict[str, float]:
         """Its shape constants, the logarithm of one of them longer by a step."""
         return {name: float(np.exp(theta[p] + LOG_STEP * (name == longer))) for name, p in self.shapes.items()}
+
+    def along(self, motion: ElementMotion, theta: np.ndarray) -> np.ndarray:
+        """(g,) what its effect's function gives along a motion."""
+        return self.addition.effect.along(motion, **self.shapes_at(theta))
 
     def by_shapes(self, theta: np.ndarray, value: np.ndarray, function: Callable[..., np.ndarray]) -> list[np.ndarray]:
         """Derivatives of function(**shapes), whose value is known, by the logarithm of each."""
