@@ -31,15 +31,26 @@ class Normal(NamedTuple):
     samples: int
     grown: float  # 2 sum of ln(noise with that of measured inertias / noise): what louder noise costs in likelihood
 
+    def with_more(self, columns: np.ndarray, out: np.ndarray) -> "Normal":
+        """With one experiment's outputs more: out (bins, q, 1 + columns), residual and derivative, of the parameters
+        columns. The matrix and the vector are added to in place."""
+        flat = out.reshape(-1, out.shape[-1])
+        products = flat.T @ flat
+        _put(columns, products, self.matrix, self.vector)
+        return self._replace(cost=self.cost + float(products[0, 0]), samples=self.samples + len(flat))
+
+
+def nothing_yet(size: int) -> Normal:
+    """Of so many parameters."""
+    return Normal(np.zeros((size, size)), np.zeros(size), 0.0, 0, 0.0)
+
 
 @may_diverge
 def normal_equations(
     problem: OutputErrorProblem, point: Point, stage: Stage = FREE_RUN, others: Sequence[OtherLaw] = ()
 ) -> tuple[Normal, list[Equations]]:
     """Summed up over the experiments; others: laws that are tried out, each with a parameter after the layout's."""
-    size = problem.layout.size + len(others)
-    found = Normal(np.zeros((size, size)), np.zeros(size), 0.0, 0, 0.0)
-    every = []
+    found, every = nothing_yet(problem.layout.size + len(others)), []
     for experiment, trajectory in zip(problem.experiments, point.trajectories, strict=True):
         observer = Observer(stage.observer, measured_motion(experiment, point.theta)) if stage.observer else None
         equations = linearise(experiment, point.theta, trajectory, others, observer, stage.contact_ramp)
@@ -51,7 +62,7 @@ def normal_equations(
 @may_diverge
 def equation_error(problem: OutputErrorProblem, point: Point) -> Normal:
     """The same on a given motion, which changes neither with the forces nor with what elements remember."""
-    found = Normal(np.zeros((problem.layout.size,) * 2), np.zeros(problem.layout.size), 0.0, 0, 0.0)
+    found = nothing_yet(problem.layout.size)
     for experiment, trajectory in zip(problem.experiments, point.trajectories, strict=True):
         equations = linearise(experiment, point.theta, trajectory)
         linear = equations.linear
@@ -62,21 +73,18 @@ def equation_error(problem: OutputErrorProblem, point: Point) -> Normal:
 
 
 def _summed(so_far: Normal, experiment: Experiment, theta, trajectory, equations, observer=None) -> Normal:
-    """With one experiment more; the matrix and the vector are added to in place."""
-    matrix, vector, cost, samples, grown = so_far
+    """With one experiment more, and what the noise that grows with parameters adds."""
     record = experiment.record
-    flat = whitened(experiment, theta, trajectory, equations, observer, in_time=False)
-    flat = flat.reshape(-1, flat.shape[-1])
-    products = flat.T @ flat
-    _put(equations.columns, products, matrix, vector)
+    out = whitened(experiment, theta, trajectory, equations, observer, in_time=False)
+    found = so_far.with_more(equations.columns, out)
     noise = output_noise(experiment, theta, record.per_bin)
-    if noise.growth:
-        filled = _filled(record)
-        for q, parameter, slope in noise.growth:
-            # a noisy regressor draws its coefficient towards zero, by as much as the noise it brings grows with it
-            vector[parameter] += slope * filled[q]
-        grown += 2.0 * float(filled @ np.log(noise.std / record.noise))
-    return Normal(matrix, vector, cost + float(products[0, 0]), samples + len(flat), grown)
+    if not noise.growth:
+        return found
+    filled = _filled(record)
+    for q, parameter, slope in noise.growth:
+        # a noisy regressor draws its coefficient towards zero, by as much as the noise it brings grows with it
+        found.vector[parameter] += slope * filled[q]
+    return found._replace(grown=found.grown + 2.0 * float(filled @ np.log(noise.std / record.noise)))
 
 
 @njit(cache=True)

@@ -25,7 +25,7 @@ from ..mechanics.outputs import predicted
 from ..observation.grid import binned
 from ..observation.trajectory import Trajectory
 from ..output_error.gauss_newton import Fit, solve
-from ..output_error.normal_equations import Normal, may_diverge, whitened
+from ..output_error.normal_equations import Normal, may_diverge, nothing_yet, whitened
 from ..parameterization.layout import FREE, Experiment
 from .band_test import of_any
 
@@ -110,22 +110,17 @@ def _normal_equations(fitted: Fit, free: np.ndarray) -> Normal:
     """The fit's own, and after its parameters the directions of `drift_of`, in its order."""
     layout = fitted.layout
     size = layout.size + (2 * len(free) + len(layout.links) + len(layout.outputs)) * MODES
-    matrix, vector, cost, samples = np.zeros((size, size)), np.zeros(size), 0.0, 0
+    found = nothing_yet(size)
     longest = max(float(record.time[-1]) for record in fitted.problem.records)
     for experiment, trajectory in zip(fitted.problem.experiments, fitted.trajectories, strict=True):
         modes = cosine(np.arange(1, MODES + 1), longest, experiment.record.time[:, None])
         equations = linearise(experiment, fitted.theta, trajectory)
         equations = _with_motion(equations, _accelerated(equations, free), modes.T, layout.size)
         out = whitened(experiment, fitted.theta, trajectory, equations, in_time=False)
-        flat = np.concatenate([out, _of_sensors(experiment, fitted.theta, trajectory, equations, modes)], axis=2)
-        flat = flat.reshape(-1, flat.shape[-1])
-        products = flat.T @ flat
-        c = np.concatenate([equations.columns, size + np.arange(-len(layout.outputs) * MODES, 0)])
-        matrix[np.ix_(c, c)] += products[1:, 1:]
-        vector[c] += products[0, 1:]
-        cost += float(products[0, 0])
-        samples += len(flat)
-    return Normal(matrix, vector, cost, samples, 0.0)
+        out = np.concatenate([out, _of_sensors(experiment, fitted.theta, trajectory, equations, modes)], axis=2)
+        columns = np.concatenate([equations.columns, size + np.arange(-len(layout.outputs) * MODES, 0)])
+        found = found.with_more(columns, out)
+    return found
 
 
 def _accelerated(equations: Equations, free: np.ndarray) -> list[dict[int, np.ndarray]]:
