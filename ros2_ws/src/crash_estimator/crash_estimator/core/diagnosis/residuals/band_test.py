@@ -5,7 +5,7 @@ square of m of them over the noise variance, itself known from s samples, has th
 degrees of freedom. A missing effect leaves its power in a few low bands, where few coefficients hide little.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -61,10 +61,8 @@ def band_test(residuals, noise_samples, periods) -> BandTest:
     for r, (residual, samples, period) in enumerate(zip(residuals, noise_samples, periods)):
         for q in range(residual.shape[1]):
             z = residual[:, q]
-            power, bands = power_in_bands(z[np.isfinite(z)], period, EDGES)
-            for low, high, inside in bands:
-                ratio = float(power[inside].mean())
-                p = probability_of(int(np.count_nonzero(inside)), samples[q], ratio)
+            for low, high, _, power in power_in_bands(z[np.isfinite(z)], period, EDGES):
+                p = probability_of(len(power), samples[q], float(power.mean()))
                 found.append((p, Band(r, q, low, min(high, 0.5 / period))))
     return _worst_of(found)
 
@@ -79,24 +77,27 @@ def band_test_of_fit(records: Sequence[Sequence[Absorbed]], noise_samples) -> Ba
     found = []
     for r, (outputs, samples) in enumerate(zip(records, noise_samples)):
         for q, one in enumerate(outputs):
-            power, bands = power_in_bands(one.residual, one.period, ABSORBING)
             root = dct(one.root, norm="ortho", axis=0)
-            for low, high, inside in bands:
-                covariance = np.eye(int(np.count_nonzero(inside))) - root[inside] @ root[inside].T
+            for low, high, inside, power in power_in_bands(one.residual, one.period, ABSORBING):
+                covariance = np.eye(len(power)) - root[inside] @ root[inside].T
                 mean, square = float(np.trace(covariance)), float((covariance**2).sum())
                 if mean < LEAST_LEFT:
                     continue
-                ratio = float(power[inside].sum()) / mean
+                ratio = float(power.sum()) / mean
                 found.append((probability_of(mean**2 / square, samples[q], ratio), Band(r, q, low, high)))
     return _worst_of(found)
 
 
-def power_in_bands(z: np.ndarray, period: float, edges: Sequence[float]):
-    """Power of the cosine transform, and the bands (low, high, coefficients inside) that have any."""
+def power_in_bands(
+    z: np.ndarray, period: float, edges: Sequence[float]
+) -> Iterator[tuple[float, float, np.ndarray, np.ndarray]]:
+    """The bands that hold any coefficients of the cosine transform: low and high Hz, which (n,), and their power."""
     power = dct(np.clip(z, -CLIP, CLIP), norm="ortho") ** 2
     frequency = np.arange(len(z)) / (2.0 * len(z) * period)
-    bands = [(low, high, (frequency >= low) & (frequency < high)) for low, high in pairwise(edges)]
-    return power, [band for band in bands if band[2].any()]
+    for low, high in pairwise(edges):
+        inside = (frequency >= low) & (frequency < high)
+        if inside.any():
+            yield low, high, inside, power[inside]
 
 
 def probability_of(freedom: float, samples: float, ratio: float) -> float:

@@ -22,10 +22,9 @@ def vibrates_from(residuals: Residuals, records: Sequence[ObservedRecord]) -> fl
     found = [np.inf]
     for record, z in zip(records, residuals.in_noise, strict=True):
         for column, samples in zip(z.T, [spectrum.samples for spectrum in record.spectra], strict=True):
-            power, bands = power_in_bands(column[np.isfinite(column)], record.period, EDGES)
             quietest, noise_only = (np.inf, 1), True
-            for low, _, inside in bands:
-                mean, count = float(power[inside].mean()), int(np.count_nonzero(inside))
+            for low, _, _, power in power_in_bands(column[np.isfinite(column)], record.period, EDGES):
+                mean, count = float(power.mean()), len(power)
                 more_than_noise = probability_of(count, samples, mean) < SIGNIFICANT
                 rises = probability_of(count, quietest[1], mean / max(quietest[0], 1.0)) < SIGNIFICANT
                 if low >= SLOWEST and (rises or (noise_only and more_than_noise)):
