@@ -1,6 +1,6 @@
 """Motions as the sensors show them, if they err as the parameters say; where bodies start, and driven ones go."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -51,11 +51,8 @@ def distortion(layout: Layout, theta: np.ndarray, channel: str) -> Distortion:
 def driven_motion(experiment: Experiment, theta: np.ndarray) -> np.ndarray:
     """Acceleration (g, b) of the driven bodies."""
     layout, record, r = experiment
-    a = np.zeros((len(layout.bodies), len(record.time))).T
-    for k, names in _driving(layout).items():
-        for name in names:
-            a[:, k] += true_acceleration(record, name, distortion(layout, theta, name)) / len(names)
-        modes = layout.modes[r][k]
+    a = _shown_by(_driving(layout), experiment, theta)
+    for k, modes in layout.modes[r].items():
         a[:, k] += record.cosines[:, : len(modes)] @ theta[modes]
     return a
 
@@ -85,6 +82,16 @@ def _driving(layout: Layout) -> dict[int, Sequence[str]]:
         k: body.acceleration for k, body in enumerate(layout.structure.bodies) if body.driven
     }
     return found | {k: (channel,) for channel, k in layout.attached.items()}
+
+
+def _shown_by(channels: Mapping[int, Sequence[str]], experiment: Experiment, theta: np.ndarray) -> np.ndarray:
+    """Acceleration (g, b) of bodies: the mean of their channels, if these err as theta says."""
+    layout, record, _ = experiment
+    a = np.zeros((len(layout.bodies), len(record.time))).T
+    for k, names in channels.items():
+        for name in names:
+            a[:, k] += true_acceleration(record, name, distortion(layout, theta, name)) / len(names)
+    return a
 
 
 def true_acceleration(record: ObservedRecord, channel: str, d: Distortion) -> np.ndarray:
@@ -129,12 +136,8 @@ def stated_start(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
 
 def measured_motion(experiment: Experiment, theta: np.ndarray) -> Trajectory:
     """What the sensors say of the motion, if they err as theta says."""
-    layout, record, _ = experiment
-    a = np.zeros((len(layout.bodies), len(record.time))).T
-    for k, body in enumerate(layout.structure.bodies):
-        for name in body.acceleration if body.free else ():
-            a[:, k] += true_acceleration(record, name, distortion(layout, theta, name)) / len(body.acceleration)
-    return motion_of(experiment, theta, a)
+    own = {k: body.acceleration for k, body in enumerate(experiment.layout.structure.bodies) if body.free}
+    return motion_of(experiment, theta, _shown_by(own, experiment, theta))
 
 
 def motion_of(experiment: Experiment, theta: np.ndarray, free: np.ndarray) -> Trajectory:
