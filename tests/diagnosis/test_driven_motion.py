@@ -80,7 +80,7 @@ def test_an_attached_body_pushes_without_its_ringing_where_noise_stands_for_that
 def test_an_element_is_crushed_by_what_its_first_end_goes_towards_its_second():
     x = np.column_stack([0.3 * np.sin(40.0 * TIME), 0.1 * np.sin(40.0 * TIME)])
     v = np.gradient(x, TIME, axis=0)
-    structure = SimpleNamespace(ends=np.array([[0, 1]]), elements=[SimpleNamespace(displacement="")])
+    structure = SimpleNamespace(ends=np.array([[0, 1]]), elements=[SimpleNamespace(displacement=None, velocity=None)])
     found = element_motion(structure, SimpleNamespace(time=TIME), SimpleNamespace(x=x, v=v), 0)
     assert_allclose(found.crush, 0.2 * np.sin(40.0 * TIME), atol=1e-15)
     assert_allclose(found.rate, v[:, 0] - v[:, 1])

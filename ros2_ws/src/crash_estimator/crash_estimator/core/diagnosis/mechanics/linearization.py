@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..observation.record import ObservedRecord
-from ..observation.trajectory import Trajectory, measured_crush
+from ..observation.trajectory import Trajectory, crush_and_rate
 from ..parameterization.layout import DRIVEN, FREE, Experiment
 from ..parameterization.terms import Link
 from .driven_motion import driven_by, start_by
@@ -212,8 +212,5 @@ def _steps(record: ObservedRecord) -> np.ndarray:
 
 
 def _crush_and_rate(link: Link, experiment: Experiment, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    if link.displacement:
-        return measured_crush(experiment.record, link.displacement, link.velocity)
-    a, b = link.crush_ends
-    origin = link.origin[experiment.index] if link.origin else 0.0
-    return trajectory.x[:, a] - trajectory.x[:, b] - origin, trajectory.v[:, a] - trajectory.v[:, b]
+    crush, rate = crush_and_rate(experiment.record, trajectory, link.crush_ends, link.displacement, link.velocity)
+    return crush - (link.origin[experiment.index] if link.origin else 0.0), rate

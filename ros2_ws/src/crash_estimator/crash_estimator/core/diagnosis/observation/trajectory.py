@@ -1,5 +1,6 @@
 """Motions of all bodies on a record's grid, integrated from their accelerations."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -50,18 +51,20 @@ def measured_trajectory(structure: Structure, record: ObservedRecord) -> Traject
 
 def element_motion(structure: Structure, record: ObservedRecord, trajectory: Trajectory, element: int) -> ElementMotion:
     """Crush, rate and peak of an element; its static force is left at 0."""
-    a, b = structure.ends[element]
     given = structure.elements[element]
-    if given.displacement:
-        crush, rate = measured_crush(record, given.displacement, given.velocity)
-    else:
-        crush, rate = trajectory.x[:, a] - trajectory.x[:, b], trajectory.v[:, a] - trajectory.v[:, b]
+    crush, rate = crush_and_rate(record, trajectory, structure.ends[element], given.displacement, given.velocity)
     peak = np.maximum(np.maximum.accumulate(crush), 0.0)
     return ElementMotion(record.time, crush, rate, peak, np.zeros_like(crush))
 
 
-def measured_crush(record: ObservedRecord, displacement: str, velocity: str | None) -> tuple[np.ndarray, np.ndarray]:
-    """(g,) crush and rate from measured channels; without its own channel the rate is the crush's smoothed slope."""
+def crush_and_rate(
+    record: ObservedRecord, trajectory: Trajectory, ends: Sequence[int], displacement: str | None, velocity: str | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """(g,) between two bodies, or from measured channels; where only the crush has one, the rate is its smoothed
+    slope."""
+    if not displacement:
+        a, b = ends
+        return trajectory.x[:, a] - trajectory.x[:, b], trajectory.v[:, a] - trajectory.v[:, b]
     crush = record.signals[displacement].on_grid
     if velocity:
         return crush, record.signals[velocity].on_grid
