@@ -121,7 +121,7 @@ def linearise(
 
 def force_along(element: str, experiment: Experiment, theta: np.ndarray, trajectory: Trajectory) -> np.ndarray:
     """(g,) N of an element along a motion."""
-    link = next(link for link in experiment.layout.links if link.name == element)
+    link = experiment.layout.link(element)
     motion = _crush_and_rate(link, experiment, trajectory)
     return link_force(link, theta, experiment.record.time, _steps(experiment.record), *motion).force
 

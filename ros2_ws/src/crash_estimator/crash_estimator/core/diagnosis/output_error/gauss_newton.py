@@ -82,7 +82,7 @@ class Fit(NamedTuple):
 
     def constant_stiffness(self, element: str) -> float | None:
         """N/m of a spring; None where it is a curve."""
-        link = next(link for link in self.layout.links if link.name == element)
+        link = self.layout.link(element)
         if link.curve is not None:
             return None
         return link.known_stiffness if link.constant is None else float(self.theta[link.constant])

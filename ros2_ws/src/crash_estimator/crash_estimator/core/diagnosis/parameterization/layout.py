@@ -28,7 +28,6 @@ from .terms import Link, Term
 FREE, DRIVEN, FIXED = 0, 1, 2
 """How a body moves: by forces, as its channels say, or not at all. The compiled passes know these codes."""
 
-
 DRIFT = 0.003
 """Of a channel's peak, standard deviation at the recording's end: the zero of an accelerometer that is shaken and warms
 up drifts by some 0.15 g in a crash of 50 g. Ours: at 0.002 three of 120 looked-at models that lack nothing, whose zeros
@@ -42,7 +41,6 @@ that a channel has to pass to be rated: halved and doubled it changed nothing of
 START_ERRS = 0.3
 """Of the velocity's standard deviation: wide, since a derivative at the end of a channel has half of the samples to go
 by, and the recording itself says soon enough how the body started. Halved it changed nothing of 34 looked-at cases."""
-
 
 FARTHEST = 2.0 * AS_WELL**0.5
 """Standard deviations that an onset may be off: twice as far as any that fits its signals as well. And that a signal's
@@ -79,6 +77,9 @@ class Layout(NamedTuple):
         """Constant stiffnesses -> what the model file says of them, N/m."""
         links = (link for link in self.links if link.constant is not None)
         return {link.constant: link.known_stiffness for link in links if link.known_stiffness > 0.0}
+
+    def link(self, name: str) -> Link:
+        return next(link for link in self.links if link.name == name)
 
     def term(self, addition: Addition) -> Term:
         """That of an addition with the same effect and target: a model has no effect twice on one target."""

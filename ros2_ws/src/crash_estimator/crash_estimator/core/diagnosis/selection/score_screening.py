@@ -97,7 +97,7 @@ def shortlist(screened: Sequence[Screened], length: int) -> list[Screened]:
 
 def _law(layout: Layout, addition: Addition) -> OtherLaw:
     """The link's law with the addition's coefficient in the parameter after the layout's last."""
-    link = next(link for link in layout.links if link.name == addition.target)
+    link = layout.link(addition.target)
     terms = (*link.terms, Term(addition, layout.size, {}))
     tension = link.tension and not addition.effect.takes_tension_away(addition.variant)
     return OtherLaw(replace(link, tension=tension, terms=terms), addition.coefficient)
