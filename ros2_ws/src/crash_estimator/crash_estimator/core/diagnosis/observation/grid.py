@@ -17,13 +17,13 @@ DRIVEN_MODES = 12
 what was left moved a padding that springs back at 400 to 700 kN/m in six of 13 looked-at tests of 0.12 s, and a small
 second effect was told for it; with 12 in none."""
 
-FEWEST_KEPT = 0.98
-"""Share of the bins that is compared at least: the last ones of a recording say least."""
-
 ATTACHED_MODES = 6
 """The same of an attached body, which mostly pushes by its inertia alone: no stiff spring feels where it is. It is
 what was tried first; with 9 and with 12 the engine of NHTSA 10146, which rings, is named within a quarter of its mass
 as well, of three looked-at copies each, though in one the car's unloading comes before it."""
+
+FEWEST_KEPT = 0.98
+"""Share of the bins that is compared at least: the last ones of a recording say least."""
 
 
 def grid_of(sample_time: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:

@@ -81,7 +81,7 @@ class ObservedRecord(NamedTuple):
     noise: np.ndarray  # (q,) standard deviation of a sample of white noise as strong as this one is where bodies move
     spectra: tuple[NoiseSpectrum, ...]  # (q,) of a sample; known from inf samples where the model states it
     offset_std: np.ndarray  # (q,)
-    signals: dict[str, Signal]  # every acceleration channel, and the measured crush and rate channels
+    signals: dict[str, Signal]  # every channel of the model, and every acceleration channel
     initial_displacement: np.ndarray  # (b,) m
     initial_velocity: np.ndarray  # (b,) m/s
     bin: np.ndarray  # (g,) bin of the sample at that instant, -1 where none

@@ -65,7 +65,7 @@ def quiet_of(recording: Recording) -> Quiet:
     return Quiet(end, max(round(recording.sample_period * 1e6), 1), values, early)
 
 
-def rest_of(one: Quiet, others: Sequence[Quiet] = ()) -> Rest:
+def rest_of(one: Quiet, others: Sequence[Quiet]) -> Rest:
     """Others of the same system; only those that are sampled alike say something of its noise's colour."""
     alike = [one, *(other for other in others if other.period == one.period)]
     blurred = min(max(each.early for each in alike), EARLIEST)

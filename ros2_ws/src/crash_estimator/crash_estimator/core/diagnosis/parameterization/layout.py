@@ -54,7 +54,7 @@ class Layout(NamedTuple):
     links: tuple[Link, ...]
     bodies: tuple[str, ...]  # the structure's, then attached ones, then the ground where something slides on it
     kind: np.ndarray  # (b,) FREE, DRIVEN or FIXED
-    outputs: tuple
+    outputs: tuple[Output, ...]
     knots: int  # parameters that are forces at knots
     common: int  # parameters before the nuisances
     size: int
@@ -103,19 +103,19 @@ def experiments_of(layout: Layout, records: Sequence[ObservedRecord]) -> tuple[E
 
 def make_layout(
     records: Sequence[ObservedRecord], magnitudes: Magnitudes, additions: Sequence[Addition],
-    roughness: Mapping[str, np.ndarray] | None = None,
+    roughness: Mapping[str, np.ndarray] | None,
 ) -> Layout:  # fmt: skip
     """roughness: of curves, by their link's name, where it is not the usual one (`free_curve.adapted_roughness`)."""
     structure, roughness = magnitudes.structure, roughness or {}
     b = Builder()
-    bodies, kind = zip(*_bodies(structure, additions), strict=True)
+    channels = dict.fromkeys(one.target for one in additions if one.attaches_body)
+    attached = {channel: len(structure.bodies) + k for k, channel in enumerate(channels)}
+    bodies, kind = zip(*_bodies(structure, attached, additions), strict=True)
     index = {name: k for k, name in reversed(list(enumerate(bodies)))}
     curves: list[Curve | None] = []
     for k, element in enumerate(structure.elements):
         wanted = element.stiffness.estimated and element.stiffness.shape == "curve"
         curves.append(_element_curve(b, k, element, magnitudes, roughness) if wanted else None)
-    channels = dict.fromkeys(one.target for one in additions if one.attaches_body)
-    attached = {channel: len(structure.bodies) + k for k, channel in enumerate(channels)}
     touching = []
     for addition in additions:
         if addition.attaches_body and addition.touches:
@@ -176,11 +176,11 @@ def make_layout(
     )  # fmt: skip
 
 
-def _bodies(structure: Structure, additions: Sequence[Addition]) -> Iterator[tuple[str, int]]:
+def _bodies(structure: Structure, attached: Iterable[str], additions: Sequence[Addition]) -> Iterator[tuple[str, int]]:
     """The structure's own and their kinds, then attached ones, then the ground where something slides on it."""
     for body in structure.bodies:
         yield body.name, FREE if body.free else DRIVEN if body.driven else FIXED
-    for channel in dict.fromkeys(one.target for one in additions if one.attaches_body):
+    for channel in attached:
         yield channel, DRIVEN
     if GROUND not in structure.body_index and any(one.effect.on_ground for one in additions):
         yield GROUND, FIXED

@@ -21,13 +21,11 @@ CELLS = 36
 SHORTEST_CRUSH = 0.03
 SHORTEST_SHARE = 0.15
 """An element that is hardly crushed gets this crush scale (m, or share of the largest crush in the structure, if that
-is less), or its scale of stiffness becomes absurd. Ours: halved and doubled they changed
-nothing of 36 looked-at cases."""
-
+is less), or its scale of stiffness becomes absurd. Ours: halved and doubled they changed nothing of 36 looked-at
+cases."""
 
 SLOWEST = 1e-3
 """m/s: of an element that hardly moves. Only forces are divided by it: it has to be above 0, not right."""
-
 
 FAST = 5.0
 """m/s: a rate of crush for which an effect's limits hold as they stand. Where the largest one is less, so are they: a

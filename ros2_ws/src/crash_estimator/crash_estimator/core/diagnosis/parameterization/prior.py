@@ -49,9 +49,8 @@ class Builder:
         return Curve(knots, column, crush, force)
 
     def prior(self) -> Prior:
-        precision = np.diag(1.0 / np.array([one.std for one in self.parameters]) ** 2)
+        std, mean, low, high = np.array([one[2:] for one in self.parameters]).T.copy()
+        precision = np.diag(1.0 / std**2)
         for columns, block in self.blocks:
             precision[np.ix_(columns, columns)] += block
-        mean = np.array([one.mean for one in self.parameters])
-        low = np.array([one.low for one in self.parameters])
-        return Prior(mean, precision, low, np.array([one.high for one in self.parameters]))
+        return Prior(mean, precision, low, high)
