@@ -174,7 +174,7 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
 def _law(link: Link, theta: np.ndarray) -> Law:
     curve, stiffness = NO_CURVE, link.known_stiffness
     if link.curve is not None:
-        curve = link.curve.knots, np.where(link.curve.column >= 0, theta[link.curve.column], 0.0), link.curve.column
+        curve = link.curve.knots, link.curve.forces(theta), link.curve.column
     elif link.constant is not None:
         stiffness = theta[link.constant]
     slope = stiffness if link.plastic else link.unloading

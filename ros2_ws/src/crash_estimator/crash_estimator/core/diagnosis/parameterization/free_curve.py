@@ -29,6 +29,10 @@ class Curve(NamedTuple):
     crush_scale: float
     force_scale: float
 
+    def forces(self, theta: np.ndarray) -> np.ndarray:
+        """(n,) N at the knots."""
+        return np.where(self.column >= 0, theta[self.column], 0.0)
+
 
 def make_knots(lowest: float, highest: float, scale: float, cells: int, tension: bool) -> np.ndarray:
     """Even knots over the crushes met and one cell beyond, with one at 0."""
@@ -40,35 +44,32 @@ def make_knots(lowest: float, highest: float, scale: float, cells: int, tension:
 
 def value(curve: Curve, theta: np.ndarray, crush: np.ndarray) -> np.ndarray:
     """(g,) N: the curve at crush (g,) m; straight on beyond the last knots."""
-    force_at = np.where(curve.column >= 0, theta[curve.column], 0.0)
-    cell = np.clip(np.searchsorted(curve.knots, crush, side="right") - 1, 0, len(curve.knots) - 2)
+    forces = curve.forces(theta)
+    cell = np.searchsorted(curve.knots[1:-1], crush, side="right")
     right = (crush - curve.knots[cell]) / np.diff(curve.knots)[cell]
-    low, high = force_at[cell], force_at[cell + 1]
+    low, high = forces[cell], forces[cell + 1]
     return low + right * (high - low)
 
 
-def slope_changes(knots: np.ndarray, crush_scale: float, force_scale: float) -> tuple[np.ndarray, np.ndarray]:
+def slope_changes(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
     """(n - 1, n) the slope at the origin and the changes of slope at the inner knots, of forces at knots; and their
     prior standard deviations (n - 1,) for a roughness of 1."""
-    stiffness = force_scale / crush_scale
-    n = len(knots)
+    knots, n = curve.knots, len(curve.knots)
     slopes = np.diff(np.eye(n), axis=0) / np.diff(knots)[:, None]
     first = slopes[int(np.clip(np.searchsorted(knots, 0.0), 0, n - 2))]
     apart = 0.5 * (knots[2:] - knots[:-2])
-    std = np.concatenate([[FIRST_SLOPE], np.sqrt(apart / crush_scale)])
-    return np.vstack([first, np.diff(slopes, axis=0)]), stiffness * std
+    std = np.concatenate([[FIRST_SLOPE], np.sqrt(apart / curve.crush_scale)])
+    return np.vstack([first, np.diff(slopes, axis=0)]), curve.force_scale / curve.crush_scale * std
 
 
-def prior_precision(
-    knots: np.ndarray, crush_scale: float, force_scale: float, roughness: np.ndarray | float
-) -> np.ndarray:
+def prior_precision(curve: Curve, roughness: np.ndarray | float) -> np.ndarray:
     """(n, n) precision of the forces at the knots; the origin's row is to be left out.
 
     roughness: one number, or one for each inner knot (n - 2,).
     """
-    rows, std = slope_changes(knots, crush_scale, force_scale)
+    rows, std = slope_changes(curve)
     scaled = rows / std[:, None]
-    scaled[1:] /= np.broadcast_to(roughness, len(knots) - 2)[:, None]
+    scaled[1:] /= np.broadcast_to(roughness, len(curve.knots) - 2)[:, None]
     return scaled.T @ scaled
 
 
@@ -77,7 +78,6 @@ def adapted_roughness(curve: Curve, theta: np.ndarray) -> np.ndarray:
 
     One step towards a Student-t prior of TAIL degrees of freedom: gentle bends stay gentle, folds may fold.
     """
-    forces = np.where(curve.column >= 0, theta[curve.column], 0.0)
-    rows, std = slope_changes(curve.knots, curve.crush_scale, curve.force_scale)
-    bend = (rows @ forces)[1:] / std[1:]
+    rows, std = slope_changes(curve)
+    bend = (rows @ curve.forces(theta))[1:] / std[1:]
     return np.sqrt((TAIL * ROUGHNESS**2 + bend**2) / (TAIL + 1.0))

@@ -44,9 +44,9 @@ class Builder:
         inner = knots != 0.0
         column = np.full(len(knots), -1)
         column[inner] = [self.add(name, start * force * x / crush, np.inf) for x in knots[inner]]
-        precision = prior_precision(knots, crush, force, roughness)
-        self.blocks.append((column[inner], precision[np.ix_(inner, inner)]))
-        return Curve(knots, column, crush, force)
+        curve = Curve(knots, column, crush, force)
+        self.blocks.append((column[inner], prior_precision(curve, roughness)[np.ix_(inner, inner)]))
+        return curve
 
     def prior(self) -> Prior:
         std, mean, low, high = np.array([one[2:] for one in self.parameters]).T.copy()
