@@ -9,6 +9,7 @@ parameters.
 
 from collections.abc import Sequence
 from contextvars import ContextVar
+from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -190,9 +191,8 @@ def fit(
     stays, trusted = (np.isin(np.arange(layout.size), which) for which in (held, layout.trusted))
     last_good: tuple[Point, Step] | None = None
     least: tuple[Point, Step, Normal] | None = None
-    halvings, last, iteration, circles = 0, np.inf, 0, 0
-    while True:
-        iteration += 1
+    halvings, last, circles = 0, np.inf, 0
+    for iteration in count(1):
         _made.set(iterations_made() + 1)
         stage = stages.pop(0) if stages else FREE_RUN
         try:
@@ -250,14 +250,10 @@ def _failed(problem: OutputErrorProblem, point: Point) -> Fit:
 
 
 def _shorten(delta: np.ndarray, shapes: np.ndarray) -> float:
-    longest = float(np.abs(delta[shapes]).max(initial=0.0))
-    return min(1.0, LONGEST_SHAPE_STEP / longest) if longest > 0.0 else 1.0
+    return LONGEST_SHAPE_STEP / max(LONGEST_SHAPE_STEP, float(np.abs(delta[shapes]).max(initial=0.0)))
 
 
 def _half_way_back(problem: OutputErrorProblem, good: Point, bad: Point) -> Point:
-    theta = good.theta + 0.5 * (bad.theta - good.theta)
-    moved = []
-    for experiment, old, new in zip(problem.experiments, good.trajectories, bad.trajectories, strict=True):
-        a = np.where(np.isfinite(new.a), 0.5 * (old.a + new.a), old.a)
-        moved.append(motion_of(experiment, theta, a))
-    return Point(theta, moved)
+    pairs = zip(good.trajectories, bad.trajectories, strict=True)
+    between = [old._replace(a=np.where(np.isfinite(new.a), 0.5 * (old.a + new.a), old.a)) for old, new in pairs]
+    return problem.moved(good.theta + 0.5 * (bad.theta - good.theta), between)
