@@ -54,17 +54,16 @@ def sampling(experiment: Experiment, theta: np.ndarray) -> tuple[Sampling, list[
     """How rows become outputs, and the parameters that act on outputs only."""
     layout, record, _ = experiment
     found = _distortions(layout, theta)
-    lag = np.array([d.delay / record.step for d in found])
-    parameters = [p for d in found for p in d.parameters]
+    lag, fraction = np.divmod([d.delay / record.step for d in found], 1.0)
     return Sampling(
         body=np.array([output.body for output in layout.outputs]),
         of_motion=np.array([output.of_motion for output in layout.outputs]),
         gain=np.array([1.0 + d.gain for d in found]),
-        lag=np.floor(lag).astype(int),
-        fraction=lag - np.floor(lag),
+        lag=lag.astype(int),
+        fraction=fraction,
         bin=record.bin,
         weight=record.valid / output_noise(experiment, theta, record.per_bin).std,
-    ), parameters
+    ), [p for d in found for p in d.parameters]
 
 
 def predicted(experiment: Experiment, theta: np.ndarray, rows: np.ndarray, trajectory: Trajectory) -> np.ndarray:
@@ -111,8 +110,8 @@ def _shown(output: Output, rows: np.ndarray, trajectory: Trajectory) -> np.ndarr
 
 def _steps_late(d: Distortion, step: float) -> tuple[int, float]:
     """Whole steps of the grid, and the rest of one."""
-    lag = d.delay / step
-    return int(np.floor(lag)), lag - np.floor(lag)
+    whole, fraction = divmod(d.delay / step, 1.0)
+    return int(whole), fraction
 
 
 def _late(shown: np.ndarray, d: Distortion, step: float) -> np.ndarray:

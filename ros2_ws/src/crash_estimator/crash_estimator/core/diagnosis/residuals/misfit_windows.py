@@ -71,10 +71,9 @@ def _runs(outside: np.ndarray, length: int) -> list[tuple[int, int]]:
 
 def _state(layout: Layout, residuals: Residuals, r: int, body: int, at: np.ndarray) -> str:
     mine = [force for link, force in zip(layout.links, residuals.links[r]) if body in link.ends]
-    if not mine:
-        return ElementState.APART.name.lower()
-    busiest = max(mine, key=lambda force: float(np.abs(force.force[at]).mean()))
-    if busiest.apart[at].mean() > 0.5:
-        return ElementState.APART.name.lower()
-    state = ElementState.UNLOADING if busiest.unloads[at].mean() > 0.5 else ElementState.LOADING
+    busiest = max(mine, key=lambda force: float(np.abs(force.force[at]).mean()), default=None)
+    if busiest is None or busiest.apart[at].mean() > 0.5:
+        state = ElementState.APART
+    else:
+        state = ElementState.UNLOADING if busiest.unloads[at].mean() > 0.5 else ElementState.LOADING
     return state.name.lower()
