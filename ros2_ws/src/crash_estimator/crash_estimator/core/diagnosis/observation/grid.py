@@ -28,7 +28,7 @@ FEWEST_KEPT = 0.98
 
 def grid_of(sample_time: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
     """Instants from time zero on, with every sample among them -> (g,) s, (n,) index of each sample."""
-    stops = sample_time if sample_time[0] < 1e-9 else np.concatenate([[0.0], sample_time])
+    stops = sample_time if sample_time[0] == 0.0 else np.concatenate([[0.0], sample_time])
     steps = np.maximum(np.ceil(np.diff(stops) / longest - 1e-6).astype(int), 1)
     index = np.concatenate([[0], np.cumsum(steps)])
     within = np.arange(index[-1]) - np.repeat(index[:-1], steps)
@@ -93,7 +93,7 @@ def bins_of(
     ok = np.isfinite(measured).astype(float)
     ok[bin_[at] < 0] = 0.0
     # at the very impact forces may jump: on which side this sample lies is chance
-    ok[time[at] < max(mixed, 1e-9)] = 0.0
+    ok[(time[at] == 0.0) | (time[at] < mixed)] = 0.0
     count = binned(bin_[at], ok, bins)
     valid = np.zeros((len(time), measured.shape[1]))
     valid[at] = ok / np.sqrt(np.maximum(count[bin_[at]], 1.0))
