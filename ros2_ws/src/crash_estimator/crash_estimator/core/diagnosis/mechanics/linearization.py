@@ -74,12 +74,10 @@ def linearise(
     closes.
     """
     layout, record, r = experiment
-    mass = masses(layout, theta)
+    free, driven = layout.kind == FREE, layout.kind == DRIVEN
     measured = np.zeros(len(layout.bodies))
     measured[[output.body for output in layout.outputs if output.fixed]] = 1.0
-    inverse = np.where(layout.kind == FREE, 1.0 / mass, measured)
-    driven = layout.kind == DRIVEN
-    inverse[driven] = 0.0
+    inverse = np.where(free, 1.0 / masses(layout, theta), measured)
     actions = _Actions(inverse)
     loads, forces = _link_forces(experiment, theta, trajectory, others, contact_ramp, actions)
     for term, k, force, by_shapes in body_loads(layout, theta, record, measured_inertia(layout, record, trajectory)):
@@ -107,7 +105,6 @@ def linearise(
     for parameter in [*of_outputs, *zeros]:
         actions.columns.setdefault(parameter, 1 + len(actions.columns))
     defect = rows.copy()
-    free = layout.kind == FREE
     defect[:, free] -= trajectory.a[:, free]
     if observer:
         defect[:, free] -= observer.acceleration(trajectory)[:, free]
