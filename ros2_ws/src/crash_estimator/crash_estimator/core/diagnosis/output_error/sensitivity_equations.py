@@ -289,12 +289,6 @@ def _sample(sampling, t, active, row, v, x, out):
                 continue  # that sample still shows an instant before the impact
             scale = share * gain[q] * weight[at, q]
             to, of = bins[at], body[q]
-            if of_motion[q] == 0:
-                for j in range(min(active, out.shape[2])):
-                    out[to, q, j] += scale * row[of, j]
-            elif of_motion[q] == 1:
-                for j in range(min(active, out.shape[2])):
-                    out[to, q, j] += scale * v[of, j]
-            else:
-                for j in range(min(active, out.shape[2])):
-                    out[to, q, j] += scale * x[of, j]
+            shown = row if of_motion[q] == 0 else v if of_motion[q] == 1 else x
+            for j in range(min(active, out.shape[2])):
+                out[to, q, j] += scale * shown[of, j]
