@@ -38,15 +38,11 @@ def propagate(system, sampling, out):
     x, v, a = np.zeros((b, columns)), np.zeros((b, columns)), np.zeros((b, columns))
     peak, row = np.zeros((links, columns)), np.zeros((b, columns))
     memory = np.zeros((len(remembers), columns))
-    number = np.full(b, -1)
-    free, measured = 0, False
+    measured = False
     for k in range(b):
-        if kind[k] == FREE:
-            number[k] = free
-            free += 1
         measured |= kind[k] == FIXED and inverse_mass[k] > 0.0
     v[:, :others], x[:, :others] = start[0], start[1]
-    matrix, inverse = np.zeros((free, free)), np.zeros((free, free))
+    matrix, inverse = np.zeros((b, b)), np.zeros((b, b))
     first, second = 2.0 * observer, observer**2
     for t in range(len(steps)):
         dt = steps[t]
@@ -80,15 +76,15 @@ def propagate(system, sampling, out):
         _push(FREE, t, others, active, ends, crush_ends, inverse_mass, kind, kx, kv, kp, knot, weight, x, v, peak, row)
         _recall(FREE, t, active, ends, inverse_mass, kind, remembers, recalled, memory, row)
         if changed[t]:
-            _implicit(t, half, sixth, observer, ends, crush_ends, inverse_mass, kx, kv, number, matrix, inverse)
+            _implicit(t, half, sixth, observer, ends, crush_ends, inverse_mass, kind, kx, kv, matrix, inverse)
         for k in range(b):
             if kind[k] == FREE:
-                own = inverse[number[k], number[k]]
+                own = inverse[k, k]
                 for j in range(active):
                     a[k, j] = own * row[k, j]
                 for m in range(b):
-                    if m != k and kind[m] == FREE and inverse[number[k], number[m]] != 0.0:
-                        scale = inverse[number[k], number[m]]
+                    if m != k and inverse[k, m] != 0.0:
+                        scale = inverse[k, m]
                         for j in range(active):
                             a[k, j] += scale * row[m, j]
         for k in range(b):
@@ -170,13 +166,10 @@ def respond(system, change):
     ) = system  # fmt: skip
     b, links = len(kind), len(ends)
     x, v, a, row, peak = np.zeros(b), np.zeros(b), np.zeros(b), np.zeros(b), np.zeros(links)
-    memory, number, free = np.zeros(len(remembers)), np.full(b, -1), 0
+    memory = np.zeros(len(remembers))
     for k in range(b):
-        if kind[k] == FREE:
-            number[k] = free
-            free += 1
         v[k], x[k] = (start[0, k] * change[:others]).sum(), (start[1, k] * change[:others]).sum()
-    matrix, inverse = np.zeros((free, free)), np.zeros((free, free))
+    matrix, inverse = np.zeros((b, b)), np.zeros((b, b))
     first, second = 2.0 * observer, observer**2
     rows, found = np.zeros((len(steps), b)), np.zeros((len(steps), b))
     for i in range(len(acts)):
@@ -215,13 +208,13 @@ def respond(system, change):
             row[ends[remembers[m], 0]] -= inverse_mass[ends[remembers[m], 0]] * force
             row[ends[remembers[m], 1]] += inverse_mass[ends[remembers[m], 1]] * force
         if changed[t]:
-            _implicit(t, half, sixth, observer, ends, crush_ends, inverse_mass, kx, kv, number, matrix, inverse)
+            _implicit(t, half, sixth, observer, ends, crush_ends, inverse_mass, kind, kx, kv, matrix, inverse)
         for k in range(b):
             if kind[k] == FREE:
                 a[k] = 0.0
                 for m in range(b):
                     if kind[m] == FREE:
-                        a[k] += inverse[number[k], number[m]] * row[m]
+                        a[k] += inverse[k, m] * row[m]
         for k in range(b):
             if kind[k] == FREE:
                 x[k] += sixth * a[k]
@@ -239,8 +232,11 @@ def respond(system, change):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _implicit(t, half, sixth, observer, ends, crush_ends, inverse_mass, kx, kv, number, matrix, inverse):
-    """Inverse of I - dt^2/6 A_x - dt/2 A_v: what the end of a step feeds back into its own acceleration."""
+def _implicit(t, half, sixth, observer, ends, crush_ends, inverse_mass, kind, kx, kv, matrix, inverse):
+    """Inverse of I - dt^2/6 A_x - dt/2 A_v: what the end of a step feeds back into its own acceleration.
+
+    Bodies that are not free stand apart in it.
+    """
     n = len(matrix)
     for i in range(n):
         for j in range(n):
@@ -255,13 +251,13 @@ def _implicit(t, half, sixth, observer, ends, crush_ends, inverse_mass, kx, kv, 
         stiffness = sixth * kx[link, t] + half * kv[link, t]
         for side in range(2):
             k = ends[link, side]
-            if number[k] < 0:
+            if kind[k] != FREE:
                 continue
             share = stiffness * inverse_mass[k] * (-1.0 if side == 0 else 1.0)
-            if number[near] >= 0:
-                matrix[number[k], number[near]] -= share
-            if number[far] >= 0:
-                matrix[number[k], number[far]] += share
+            if kind[near] == FREE:
+                matrix[k, near] -= share
+            if kind[far] == FREE:
+                matrix[k, far] += share
     for i in range(n):  # the matrix is close to I: no pivoting needed
         pivot = 1.0 / matrix[i, i]
         for j in range(n):
