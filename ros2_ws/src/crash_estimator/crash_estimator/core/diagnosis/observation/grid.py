@@ -49,19 +49,15 @@ def on_grid(time: np.ndarray, at: np.ndarray) -> dict[str, Any]:
     }
 
 
+@njit(cache=True)
 def binned(bin_: np.ndarray, values: np.ndarray, bins: int) -> np.ndarray:
     """(bins, columns) sums of values (n, columns), each in its bin (n,); -1: in none."""
     found = np.zeros((bins, values.shape[1]))
-    _add_up(bin_, values, found)
-    return found
-
-
-@njit(cache=True)
-def _add_up(bin_, values, found):
     for k in range(values.shape[1]):
         for t in range(len(bin_)):
             if bin_[t] >= 0:
                 found[bin_[t], k] += values[t, k]
+    return found
 
 
 def _of_fast_length(bins: int) -> int:
