@@ -9,7 +9,7 @@ carried, so that a force that jumps at contact gives the right momentum whatever
 that is spent (`acts_when_spent`) it is 1 as long as there is crush. A link without tension whose
 damper never pulls carries nothing where F is negative though S is not. What z remembers follows
 
-    dz_t = a_t dz_{t-1} + b_t dX_t - b'_t dX_{t-1},
+    dz_t = a_t dz_{t-1} + b_t dX_t - b'_t dX_{t-1}.
 """
 
 from functools import partial
@@ -54,10 +54,10 @@ class _Inside(NamedTuple):
 class _Beside:
     """Forces beside the spring that act through the same gate: their sum, N, and its slopes by crush and rate."""
 
-    def __init__(self, gate: np.ndarray, slope: np.ndarray, nothing: np.ndarray):
+    def __init__(self, gate: np.ndarray, slope: np.ndarray):
         """gate (g,), and its change with the crush, 1/m."""
         self.gate, self.slope = gate, slope
-        self.force = self.px = self.pv = nothing
+        self.force = self.px = self.pv = np.zeros_like(gate)
 
     def add(self, force: np.ndarray, px: np.ndarray | float, pv: np.ndarray | float) -> None:
         self.force, self.px, self.pv = self.force + force, self.px + px, self.pv + pv
@@ -120,8 +120,8 @@ def link_force(link: Link, theta: np.ndarray, time, dt, crush: np.ndarray, rate:
     damping = theta[link.damping] if link.damping is not None else link.known_damping
     memories: list[Memory] = []
     if damping or link.damping is not None or link.parallel or link.remembering:
-        contact = _Beside(found.gate, found.gate_slope, np.zeros_like(x))
-        crushed = _Beside(found.crushed, found.crushed_slope, np.zeros_like(x)) if law.unloads else contact
+        contact = _Beside(found.gate, found.gate_slope)
+        crushed = _Beside(found.crushed, found.crushed_slope) if law.unloads else contact
         beside = crushed if outlasts(link.acts_when_spent) else contact
         beside.add(damping * rate, 0.0, damping)
         if link.damping is not None:
