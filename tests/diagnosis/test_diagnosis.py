@@ -107,6 +107,14 @@ def test_an_effect_outside_the_vocabulary_is_not_given_a_name():
     assert "no candidate explains what is left" in found.text
 
 
+@pytest.mark.parametrize("offered", [(), ("load_path",)])
+def test_where_nothing_that_is_offered_can_act_nothing_is_named(offered):
+    """Its two bodies are joined already. Without a candidate the search ended in an IndexError."""
+    model, recordings, _ = case("impactor", "viscous_damping")
+    found = diagnose(model, recordings, effects={name: EFFECTS[name] for name in offered})
+    assert found.verdict == "unexplained" and not found.ranking and "no candidate explains what is left" in found.text
+
+
 def test_where_nothing_unloads_before_the_end_that_is_said():
     """What only unloading shows, a recording that is cut off before cannot."""
     model, recordings, _ = case("impactor")

@@ -49,7 +49,8 @@ class Builder:
         return curve
 
     def prior(self) -> Prior:
-        std, mean, low, high = np.array([one[2:] for one in self.parameters]).T.copy()
+        each = [(one.std, one.mean, one.low, one.high) for one in self.parameters]
+        std, mean, low, high = np.array(each).T.copy()
         precision = np.diag(1.0 / std**2)
         for columns, block in self.blocks:
             precision[np.ix_(columns, columns)] += block

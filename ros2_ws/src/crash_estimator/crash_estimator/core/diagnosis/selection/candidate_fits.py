@@ -81,7 +81,7 @@ def fit_harder(search: "_Search", model: Model, beside: bool = False) -> None:
         # what explains little of less than a real structure leaves is fitted neither in other ways nor anew
         of_little = ways if model.residuals.mean_square >= THRESHOLDS.real_structure else (ways[1], ways[-1])
         for harder in ways:
-            if search_is_over() or search.reached_the_floor():
+            if search_is_over() or search.reached_the_floor() or not search.found:
                 break
             if search.explains_most():
                 if search.out_of_reach():
