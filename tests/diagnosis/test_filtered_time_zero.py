@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from crash_estimator.core.diagnosis import diagnose
+from crash_estimator.core.diagnosis.report.tolerance import DEFAULT, tolerance_of
 from crash_estimator.core.diagnosis.selection import onset_search
 from crash_estimator.core.diagnosis.selection.onset_search import Begun
 from crash_estimator.core.diagnosis.selection.time_zero import Shift
@@ -41,10 +42,9 @@ def crash(speed: float, late: float, cfc: int, gap: float = 0.0, seed: int = 0) 
     return filter_recording(Recording(test, np.arange(-400, 2400) * 100_000, peaks * (wave[:, None] + noise)), cfc)
 
 
-def diagnosed(**of_crash):
-    return diagnose(
-        ModelFile.model_validate(yaml.safe_load(MODEL)).structure(), [crash(speed, **of_crash) for speed in (7.0, 13.0)]
-    )
+def diagnosed(tolerance=DEFAULT, **of_crash):
+    model = ModelFile.model_validate(yaml.safe_load(MODEL)).structure()
+    return diagnose(model, [crash(speed, **of_crash) for speed in (7.0, 13.0)], tolerance=tolerance)
 
 
 @pytest.mark.parametrize(("late", "cfc"), [(3e-3, 60), (1e-3, 180)])
@@ -54,6 +54,13 @@ def test_a_time_zero_of_filtered_signals_is_told_without_a_gap(late, cfc):
     (zero,) = found.steps
     assert (found.verdict, found.complete, zero.effect) == ("effect_missing", True, "time_zero")
     assert all(abs(seconds - late) < 1.5e-4 for seconds in zero.shape.values()) and len(zero.shape) == 2
+
+
+def test_who_tolerates_what_a_wrong_time_zero_leaves_hears_from_where_it_was_compared():
+    """What is left was told as falling, by nothing that was added."""
+    found = diagnosed(tolerance_of("60%"), late=-3e-3, cfc=60)
+    assert (found.verdict, found.steps) == ("adequate", ()) and found.residual_rms.before == found.residual_rms.after
+    assert found.text.endswith(" from the stated time zero, and are compared from there on")
 
 
 def test_a_gap_of_filtered_signals_is_told_without_a_time_zero():

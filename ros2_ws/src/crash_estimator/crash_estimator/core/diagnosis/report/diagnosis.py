@@ -112,6 +112,8 @@ def diagnose(
     # what is stopped after so many iterations has time for that
     wrong = "" if stopped and seconds else wrong_description(*stated, begun.path, effects)
     found = _answer(structure, begun.path, tolerance, begun.zero)
+    if begun.zero and TIME_ZERO not in [step.effect for step in found.steps]:
+        begun = begun._replace(zero=None, taken=begun.zero.shifts)
     remarks = [one for one in (faults, wrong if found.verdict != ADEQUATE else "") if one]
     remarks += remarks_on(begun, found.verdict == EFFECT_MISSING, found.left)
     if stopped:
@@ -152,7 +154,7 @@ class _Told(NamedTuple):
 def _answer(structure: Structure, path: SelectionPath, tolerance: Tolerance, zero: TimeZero | None) -> Diagnosis:
     given = zero.as_stated if zero else path.steps[0].sized
     if tolerance.stated and tolerance.admits(left_by(given, band_of_steps(path.steps))):
-        path, zero = up_to(path, 0), None  # whoever says so wants nothing added
+        path, zero, given = up_to(path, 0), None, path.steps[0].sized  # whoever says so wants nothing added
     told = _told(given, path, zero)
     sure = _sure(told)
     if sure < len(path.added):
