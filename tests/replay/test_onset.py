@@ -49,6 +49,19 @@ def test_a_shifted_time_zero_is_found_within_two_samples(name):
         assert_array_equal(again.values, recording.values)
 
 
+@pytest.mark.parametrize("name", SIMULATED)
+@pytest.mark.parametrize("ms", [1.0, 2.0, 5.0])
+def test_a_record_that_begins_hardly_before_the_impact_has_no_onset(name, ms):
+    """Its first 10 ms are the impact's: taken for its rest, the signals began up to 28 ms late, and an offset of its
+    mean made nothing of the crash."""
+    recording = read_bag(BAGS / f"{name}.mcap")
+    kept = recording.time_ns >= -round(ms * 1e6)
+    cut = Recording(recording.test, recording.time_ns[kept], recording.values[kept])
+    assert find_onset(cut) is None and onset_note(cut) == ""
+    with pytest.raises(RecordingError, match="no onset found"):
+        at_onset(cut)
+
+
 @pytest.mark.parametrize("name", MEASURED)
 def test_of_measured_tests_the_same_instant_is_found_whatever_is_stated(name):
     """Nobody knows their truth: what is stated is a contact switch's or a person's word, within 1 ms of what is

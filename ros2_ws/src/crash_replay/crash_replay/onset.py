@@ -103,7 +103,7 @@ def find_onset(recording: Recording) -> Onset | None:
 def _onset_of_any(recording: Recording) -> Onset | None:
     period = recording.sample_period
     quiet = max(LEAST_AT_REST, round(AT_REST / period)) if period else 0
-    if not quiet or len(recording) < 2 * quiet + LEAST_AHEAD:
+    if not quiet or len(recording) < 2 * quiet + LEAST_AHEAD or _begins_moving(recording, quiet):
         return None
     alarm = _first_alarm(recording, quiet, period)
     if alarm is None:
@@ -119,6 +119,21 @@ def _onset_of_any(recording: Recording) -> Onset | None:
     precision = int(max(np.abs(recording.time_ns[almost] - time_ns).max(), alarm.gentle * alarm.run * period * 1e9))
     differs = abs(time_ns) > max(DIFFERS * period * 1e9 + 1.0, precision)
     return Onset(time_ns, sample, tuple(recording.test.channels[k].name for k in alarm.woken), precision, differs)
+
+
+def _begins_moving(recording: Recording, quiet: int) -> bool:
+    """Whether the record begins within the impact, or hardly before: a channel of the vehicle or the barrier goes
+    straight somewhere from the first sample on, by more than what is shaken does of its peak, and that is more than
+    half of its variance."""
+    across = np.linspace(-0.5, 0.5, quiet)
+    for channel, values in zip(recording.test.channels, recording.values.T, strict=True):
+        first = values[:quiet]
+        if channel.quantity in RESTS_AT_ZERO and takes_part_in_the_impact(channel) and np.isfinite(first).all():
+            by = 12.0 / quiet * float(across @ first)  # the slope of a line by least squares, over the whole of it
+            farthest = np.nanmax(np.abs(values - first.mean()))
+            if abs(by) > ALARM * SHAKES * farthest and by**2 / 12.0 > 0.5 * first.var():
+                return True
+    return False
 
 
 def _first_alarm(recording: Recording, quiet: int, period: float) -> _Alarm | None:
