@@ -73,9 +73,21 @@ def test_it_is_sought_where_more_than_the_body_s_own_acceleration_shows_it_and_n
     assert sought(hung_model(), recording) == {"car"}
     alone = replace(hung_model(), bodies=tuple(replace(body, force=None) for body in hung_model().bodies))
     assert not sought(alone, recording)
+    assert not sought(hung_model(), with_a_sensor(recording, recording.values[:, 0]))
+
+
+@pytest.mark.parametrize("spare", [
+    np.full(1, 30.0), np.full(1, np.nan), np.random.default_rng(9).normal(0.0, 5.0, len(crash(12.0, 8))),
+], ids=["dead", "empty", "at rest"])  # fmt: skip
+def test_a_sensor_that_shows_no_motion_is_none(spare):
+    recording = with_a_sensor(crash(12.0, 8), np.resize(spare, len(crash(12.0, 8))))
+    assert sought(hung_model(), recording) == {"car"}
+
+
+def with_a_sensor(recording: Recording, values: np.ndarray) -> Recording:
     channels = (*recording.test.channels, Channel("engine_ax", "acceleration", "engine"))
-    values = np.column_stack([recording.values, recording.values[:, 0]])
-    assert not sought(hung_model(), replace(recording, test=replace(recording.test, channels=channels), values=values))
+    both = np.column_stack([recording.values, values])
+    return replace(recording, test=replace(recording.test, channels=channels), values=both)
 
 
 @pytest.mark.parametrize(

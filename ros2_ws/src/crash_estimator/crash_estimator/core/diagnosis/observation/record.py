@@ -207,7 +207,8 @@ def observe(structure: Structure, recording: Recording, rest: Rest | None = None
     time, at = grid_of(sample_time, longest_step(structure, recording))
     outputs = outputs_of(structure)
     names = [name for _, name, _ in structure.channels()]
-    names += [c.name for c in recording.test.channels if c.quantity == "acceleration"]
+    others = (c.name for c in recording.test.channels if c.quantity == "acceleration")
+    names += [name for name in others if np.isfinite(recording.column(name)).any()]
     rest = rest or rests_of([recording])[0]
     derived = {name for body in structure.bodies if body.derived for name in body.acceleration}
     signals = {name: _signal(recording, name, time, rest, name in derived) for name in dict.fromkeys(names)}
@@ -238,7 +239,7 @@ def observe(structure: Structure, recording: Recording, rest: Rest | None = None
     bin_, valid, bins = bins_of(
         time, at, measured, mixed=mixed, transformed=not all(spectrum.white for spectrum in spectra)
     )
-    record = ObservedRecord(
+    return ObservedRecord(
         test=recording.test,
         **on_grid(time, at),
         measured=measured,
@@ -252,8 +253,7 @@ def observe(structure: Structure, recording: Recording, rest: Rest | None = None
         bin=bin_,
         valid=valid,
         bins=bins,
-    )
-    return record.in_band(np.inf)
+    ).in_band(np.inf)
 
 
 def refuse_twins(recordings: Sequence[Recording]) -> None:

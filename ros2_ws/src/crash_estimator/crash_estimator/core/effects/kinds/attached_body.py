@@ -142,14 +142,16 @@ class AttachedBody(Effect):
 
 
 def _unused(structure: Structure, magnitudes) -> list[str]:
-    """Acceleration channels of the model's axis that it does not use, and that are on no body whose mass it has; of two
-    that agree to the last bit one."""
+    """Acceleration channels of the model's axis that it does not use, that move by more than twice their noise, and
+    that are on no body whose mass it has; of two that agree to the last bit one."""
     used = {name for _, name, _ in structure.channels()}
     weighed = {body.name for body in structure.bodies if body.free}
-    channels, signals = magnitudes.records[0].test.channels, magnitudes.records[0].signals
+    channels, (signals, *others) = magnitudes.records[0].test.channels, [one.signals for one in magnitudes.records]
     axes = {channel.axis for channel in channels if channel.name in used}
     of_axis = [c for c in channels if c.quantity == "acceleration" and c.axis in axes]
-    unused = [c.name for c in of_axis if c.name not in used and c.body not in weighed]
+    shown = [c for c in of_axis if all(c.name in each for each in (signals, *others))]
+    moving = [c for c in shown if np.std(signals[c.name].on_grid) > 2.0 * signals[c.name].noise]
+    unused = [c.name for c in moving if c.name not in used and c.body not in weighed]
     copies = {b for a, b in combinations(unused, 2) if np.array_equal(signals[a].values, signals[b].values)}
     return [name for name in unused if name not in copies]
 
