@@ -78,16 +78,15 @@ def test_what_rings_is_gone_on_with_below_the_band_as_soon_as_the_best_first_can
 
 @pytest.mark.parametrize(("wanted", "over", "searches"), [(True, False, 2), (False, False, 1), (True, True, 1)])
 def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypatch, wanted, over, searches):
-    begun, cells, given = [], [], model(1.5)
+    begun, given = [], model(1.5)
     made_up = {
         "first_step": lambda *given: SimpleNamespace(leaves_noise=True),
         "forward_selection": lambda *given: begun.append(given) or ([step(given[2])], given[2]),
         "sized_models": lambda steps, final: [final],
-        "measure_magnitudes": lambda structure, records, finer: cells.append(finer) or SimpleNamespace(cells=finer),
         "fit_given": lambda *given: model(1.5),
         "drift_of": lambda fit: SimpleNamespace(constant=True),
         "analyse": lambda fit: None,
-        "_wants_finer_curves": lambda *given: wanted,
+        "_with_finer_curves": lambda *given: SimpleNamespace(cells=72) if wanted else None,
         "up_to_the_least_error": lambda steps, final: (steps, final),
         "search_is_over": lambda: over,
     }
@@ -96,7 +95,25 @@ def test_finer_curves_are_tried_where_they_are_wanted_and_there_is_time(monkeypa
     magnitudes = SimpleNamespace(structure=None, records=(), cells=36)
     assumptions._with_curves_as_fine_as_needed(magnitudes, given, {})
     assert len(begun) == searches
-    assert cells == [2 * magnitudes.cells], "of half the width"
+
+
+@pytest.mark.parametrize(("curve", "left", "found", "white_with", "taken"), [
+    ("curve", 1.5, 1, 144, 144),  # what was found may stand for a kink
+    ("curve", 1.5, 1, None, None),
+    (None, 1.5, 1, 144, None),  # there is none to be finer
+    ("curve", 1.5, 0, 144, None),  # nothing was found that could
+    ("curve", 50.0, 1, 144, None),  # no kink leaves so much
+    ("curve", 50.0, 2, 72, 72),  # of two the other alone
+])  # fmt: skip
+def test_curves_are_finer_where_effects_may_stand_for_their_folds(monkeypatch, curve, left, found, white_with, taken):
+    monkeypatch.setattr(assumptions, "measure_magnitudes", lambda s, r, n: SimpleNamespace(records=r, cells=n))
+    fitted = lambda by, records, additions: SimpleNamespace(white=by.cells == white_with)  # noqa: E731
+    monkeypatch.setattr(assumptions, "fit_model", fitted)
+    final = SimpleNamespace(found=found * ("effect",), given=(), white=True)
+    layout = SimpleNamespace(links=[SimpleNamespace(curve=curve)])
+    given = SimpleNamespace(residuals=SimpleNamespace(mean_square=left), fit=SimpleNamespace(layout=layout))
+    finer = assumptions._with_finer_curves(SimpleNamespace(structure=None, records=()), given, final, False, None)
+    assert (finer and finer.cells) == taken
 
 
 @pytest.mark.parametrize(("knots", "goes_on"), [((0.0, 0.1), True), ((0.0, 0.1, 0.2), False)])
