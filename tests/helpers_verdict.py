@@ -28,6 +28,6 @@ HARDLY_MORE = BEYOND_DOUBT, ranked("clearance", "engine", 960.0, explained=0.86)
 HALF_AS_MUCH_AGAIN = BEYOND_DOUBT, ranked("clearance", "engine", 960.0, explained=0.84)
 LESS_LIKELY = BEYOND_DOUBT, ranked("clearance", "engine", 940.0, explained=0.86)
 EVIDENCE = Evidence(
-    1, False, STANDS_STILL, left(0.2, 10.0, 0.5), left(0.05, 2.0), (LEADER,), True, True,
+    1, False, STANDS_STILL, left(0.2, 10.0, 0.5), left(0.05, 2.0), (LEADER,), (), True, True,
     by_first=0.0, needed=THRESHOLDS.most, place_of=str, assumed=False, varying=None, loud=False,
 )  # fmt: skip

@@ -24,6 +24,7 @@ from helpers_verdict import (
 from crash_estimator.cli import diagnose as command
 from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.core.diagnosis.report import diagnosis as report
+from crash_estimator.core.diagnosis.report import verdict_text
 from crash_estimator.core.diagnosis.report.tolerance import DEFAULT, Tolerance, tolerance_of
 from crash_estimator.core.diagnosis.report.verdict import verdict_on
 from crash_estimator.core.diagnosis.residuals.in_band import InBand
@@ -146,6 +147,21 @@ def test_what_is_certain_is_beyond_its_standard_deviation_and_short_of_its_limit
     steps = (SimpleNamespace(coefficient=coefficient, std=std),)
     told = SimpleNamespace(added=steps, steps=steps)
     assert report._certain([Addition(EFFECTS[effect], "target")], told) == certain
+
+
+@pytest.mark.parametrize(("names", "said"), [
+    (["the gain"], "; this cannot be told from a mass on these recordings"),
+    (["a damper", "the gain"], "; channel_gain on barrier_fx cannot be told from a mass on these recordings"),
+])  # fmt: skip
+def test_it_is_said_of_each_effect_what_it_cannot_be_told_from(names, said):
+    """Of a damper and a car 5 % too heavy the load cell was blamed for the mass, and no word of that."""
+    gain = replace(ranked("channel_gain", "barrier_fx", 50.0), confounded_with=("a mass",))
+    first, *further = [LEADER, gain][-len(names) :]
+    evidence = EVIDENCE._replace(white=True, drift=NOTHING_VARIES, ranking=(first,), further=further)
+    sharp = SimpleNamespace(spectra=[SimpleNamespace(passed=np.inf)])
+    steps = [SimpleNamespace(name=name, effect="", evidence=50.0) for name in names]
+    size = report.Rms(3.0, 0.5, 0.5)
+    assert said in verdict_text._missing(evidence, DEFAULT, steps, SimpleNamespace(records=[sharp, sharp]), size)
 
 
 @pytest.mark.parametrize(("effects", "share"), [

@@ -225,6 +225,7 @@ def _evidence(path: SelectionPath, told: _Told, structure: Structure) -> Evidenc
         before=before,
         after=after,
         ranking=told.ranking,
+        further=[one for step in path.steps[1 : len(path.added)] for one in ranking_of(step)[:1]],
         weighed=inflated or after.share_explained(before) > THRESHOLDS.nearly_all,
         certain=_certain(path.added, told),
         by_first=_explained_by_first_effect(from_there_on, path.added, told.band),

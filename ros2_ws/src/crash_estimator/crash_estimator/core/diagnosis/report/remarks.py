@@ -39,6 +39,6 @@ def _on_a_small_error(path: SelectionPath) -> list[str]:
     first = path.added[0]
     size, _, _ = stated(best.fit.layout.term(best.addition), best.fit)
     value, std, _ = stated(best.fit.layout.term(first), best.fit)
-    error = f"{' on '.join(best.addition.key)} of {size:.3g} {effect.unit}"
+    error = f"{' on '.join(best.addition.key)} of {f'{size:.3g} {effect.unit}' if effect.unit else f'{size:.2%}'}"
     law = f"{' on '.join(first.key)} would be {value:.4g} +- {std:.2g} {first.effect.unit}"
     return [f"beside {error}, which weighs too little to be told, {law}"]

@@ -25,6 +25,7 @@ class Evidence(NamedTuple):
     before: Left  # of the model as given
     after: Left  # with what was added
     ranking: Sequence[Ranked]  # of the first step
+    further: Sequence[Ranked]  # what was added after that, each as its own step has it
     weighed: bool  # the evidence was taken in a noise as large as what is left
     certain: bool  # every coefficient that was added is beyond its standard deviation, and short of its limits
     by_first: float  # share of the misfit in the band that the first effect explains, wherever it is missing

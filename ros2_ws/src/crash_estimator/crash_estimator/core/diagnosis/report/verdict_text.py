@@ -77,10 +77,13 @@ def _adequate(evidence: Evidence, tolerance: Tolerance, final: Model, size: Rms)
 
 
 def _missing(evidence: Evidence, tolerance: Tolerance, steps: Sequence[StepReport], final: Model, size: Rms) -> str:
-    rivals, advice = evidence.ranking[0].confounded_with if evidence.ranking else (), ""
-    if rivals:
-        advice = f"; this cannot be told from {', '.join(rivals)}"
-        advice += " on one recording: record another speed" if len(final.records) == 1 else " on these recordings"
+    alike = [one for one in (*evidence.ranking[:1], *evidence.further) if one.confounded_with]
+    each = (
+        f"{one.name if len(steps) > 1 else 'this'} cannot be told from {', '.join(one.confounded_with)}"
+        for one in alike
+    )
+    where = " on one recording: record another speed" if len(final.records) == 1 else " on these recordings"
+    advice = f"; {', '.join(each)}{where}" if alike else ""
     if evidence.noise:
         small = size.before < THRESHOLDS.near_floor**0.5 * size.noise_floor
         why = f"; small, yet noise would not leave it ({steps[0].evidence:.0f} nats of evidence)" if small else ""
