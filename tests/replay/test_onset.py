@@ -52,7 +52,7 @@ def test_a_shifted_time_zero_is_found_within_two_samples(name):
 @pytest.mark.parametrize("name", SIMULATED)
 @pytest.mark.parametrize("ms", [1.0, 2.0, 5.0])
 def test_a_record_that_begins_hardly_before_the_impact_has_no_onset(name, ms):
-    """Its first 10 ms are the impact's: taken for its rest, the signals began up to 28 ms late, and an offset of its
+    """Its first 10 ms are the impact's: taken for its rest, the signals began up to 29 ms late, and an offset of its
     mean made nothing of the crash."""
     recording = read_bag(BAGS / f"{name}.mcap")
     kept = recording.time_ns >= -round(ms * 1e6)
