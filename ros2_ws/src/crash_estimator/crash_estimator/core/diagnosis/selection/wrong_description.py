@@ -27,9 +27,24 @@ KILO = 1000.0
 TAKEN_FOR = {"acceleration": (G, KILO), "force": (G, KILO), "displacement": (KILO,), "velocity": (KILO,)}
 """Quantity -> by what another unit is larger: g or mm/ms^2 than m/s^2, kgf or kN than N, m than mm."""
 
-FASTER = 2.0
+FASTER = 2.2
 """Times the largest speed in a test that a body may change its own by, and times the momentum at that speed that forces
-may take: thrown back as fast as they came."""
+may take: 2 when thrown back as fast as they came, and a tenth for what noise and a sensor's gain add to that."""
+
+LARGER = {"km/h": 3.6, "mph": 3.6 / 1.609344}
+"""Unit that a speed may be stated in -> by what the number is larger than in m/s."""
+
+
+class _Doubt(NamedTuple):
+    """Recordings of which something in the description may be wrong, and what."""
+
+    model: Model  # as given, of these recordings
+    others: Sequence[tuple[str, Sequence[Recording]]]  # what is wrong, and the recordings with that mended
+
+    @property
+    def tests(self) -> str:
+        ids = [record.test.id for record in self.model.records]
+        return f"test {ids[0]}" if len(ids) == 1 else f"tests {' and '.join(ids)}"
 
 
 class _Mended(NamedTuple):
@@ -46,45 +61,62 @@ def wrong_description(
     """What may be wrong in the description of a test: where it explains at least half of what the model as given
     leaves, or leaves noise by itself as what was found does; empty where nothing does.
 
-    path: what was found on all recordings; looked at is the one of which the model as given leaves most.
+    path: what was found on all recordings. Looked at by itself is the one that the model as given, fitted to it alone,
+    leaves most of; at all of them only for speeds in another unit, which each alone may do with.
 
     Raises RecordingError where something explains nearly all, and nothing that was found does.
     """
     given = path.steps[0].before
-    left = _left(given)
-    recording = recordings[int(np.argmax(left))]
     if path.noise and not path.added:
         return ""
-    if max(left) < THRESHOLDS.some and not _go_on(structure, recording):
-        return ""
-    others = list(_other_speeds(structure, recording))
+    doubts = [_between(structure, recordings, given)] if len(recordings) > 1 else []
+    if max(_most_left(given)) >= THRESHOLDS.some or any(_go_on(structure, recording) for recording in recordings):
+        doubts.insert(0, _in_the_worst(structure, recordings, given, effects))
+    return next(filter(None, (_said_of(doubt, structure, path, effects) for doubt in doubts)), "")
+
+
+def _in_the_worst(
+    structure: Structure, recordings: Sequence[Recording], given: Model, effects: Mapping[str, Effect]
+) -> _Doubt:
+    alone = [_model(structure, [recording], effects) for recording in recordings]
+    worst = int(np.argmax([max(_most_left(model)) for model in alone]))
+    recording = recordings[worst]
+    others = [*_other_speeds(structure, recording), *_slower(structure, recordings, [worst])]
     if not given.untouched:  # else it is as likely the structure that is the wrong way round
         others += _other_channels(structure, recording)
-    if not others:
-        return ""
-    model = _model(structure, recording, effects)
-    hopeless = THRESHOLDS.near_floor * cost_of_noise(model.records) if path.noise else THRESHOLDS.half * model.fit.cost
+    return _Doubt(alone[worst], others)
+
+
+def _between(structure: Structure, recordings: Sequence[Recording], given: Model) -> _Doubt:
+    """Of several recordings the speeds of one, or of all."""
+    every = range(len(recordings))
+    those = [*([k] for k in every), list(every)]
+    return _Doubt(given, [each for these in those for each in _slower(structure, recordings, these)])
+
+
+def _said_of(doubt: _Doubt, structure: Structure, path: SelectionPath, effects: Mapping[str, Effect]) -> str:
+    cost, records = doubt.model.fit.cost, doubt.model.records
+    hopeless = THRESHOLDS.near_floor * cost_of_noise(records) if path.noise else THRESHOLDS.half * cost
     mended = []
-    for what, other in others:
-        otherwise = _model(structure, other, effects, hopeless)
-        mended.append(_Mended(what, otherwise, 1.0 - otherwise.fit.cost / model.fit.cost))
+    for what, recordings in doubt.others:
+        otherwise = _model(structure, recordings, effects, hopeless)
+        mended.append(_Mended(what, otherwise, 1.0 - otherwise.fit.cost / cost))
     likely = [one for one in mended if (one.model.white if path.noise else one.explained > THRESHOLDS.half)]
     if not likely:
         return ""
     likely.sort(key=lambda one: -one.explained)
     what = " or ".join(one.what for one in likely[: THRESHOLDS.few])
-    as_stated, least = max(_left(model)), min(max(_left(one.model)) for one in likely)
+    as_stated, least = max(_most_left(doubt.model)), min(max(_most_left(one.model)) for one in likely)
     if not path.noise and least < (1.0 - THRESHOLDS.nearly_all) * min(as_stated, 1.0):
         raise RecordingError(
-            f"test {recording.test.id}: {what}, it seems: of the worst channel's mean square the model leaves "
-            f"{as_stated:.0%} as stated and {least:.1%} so; mend the test's description and import it again, or the "
-            "model's masses"
+            f"{doubt.tests}: {what}, it seems: of the worst channel's mean square the model leaves {as_stated:.0%} as "
+            f"stated and {least:.1%} so; mend the test's description and import it again, or the model's masses"
         )
     then = "only noise would be left" if path.noise else f"{likely[0].explained:.0%} of the misfit would go"
-    return f"perhaps, in test {recording.test.id}, {what}: mended, {then}"
+    return f"perhaps, in {doubt.tests}, {what}: mended, {then}"
 
 
-def _other_channels(structure: Structure, recording: Recording) -> Iterator[tuple[str, Recording]]:
+def _other_channels(structure: Structure, recording: Recording) -> Iterator[tuple[str, Sequence[Recording]]]:
     """The recording with the sign or unit of one channel mended, or of all of a quantity, or the sign of all, and what
     is wrong then."""
     quantities = {name: quantity for _, name, quantity in structure.channels()}
@@ -95,19 +127,19 @@ def _other_channels(structure: Structure, recording: Recording) -> Iterator[tupl
         quantity = quantities[names[0]]
         which = f"channel {names[0]} is" if len(names) == 1 else f"channels {' and '.join(names)} are"
         if quantity != "acceleration" or names not in alike or go_on:
-            yield f"{which} reversed", _times(recording, names, -1.0)
+            yield f"{which} reversed", [_times(recording, names, -1.0)]
         bounded = quantity == "acceleration" or (fastest and on_fixed.issuperset(names))  # by the stated speeds
         for factor in TAKEN_FOR[quantity]:
             larger, smaller = (_times(recording, names, by) for by in (factor, 1.0 / factor))
             if not bounded or not _is_too_much(structure, larger, names, quantity):
-                yield f"{which} {factor:.4g} times too small", larger
+                yield f"{which} {factor:.4g} times too small", [larger]
             if not bounded or _is_too_much(structure, recording, names, quantity):
-                yield f"{which} {factor:.4g} times too large", smaller
+                yield f"{which} {factor:.4g} times too large", [smaller]
     if go_on and len(quantities) > 1:
-        yield "all channels are reversed", _times(recording, list(quantities), -1.0)
+        yield "all channels are reversed", [_times(recording, list(quantities), -1.0)]
 
 
-def _other_speeds(structure: Structure, recording: Recording) -> Iterator[tuple[str, Recording]]:
+def _other_speeds(structure: Structure, recording: Recording) -> Iterator[tuple[str, Sequence[Recording]]]:
     """The recording with bodies that come as fast as they lose speed, where they cannot have come as stated: unless a
     driven body may have struck them."""
     if any(body.driven for body in structure.bodies):
@@ -117,8 +149,29 @@ def _other_speeds(structure: Structure, recording: Recording) -> Iterator[tuple[
         lost = -max(changes, key=abs)
         there = {body.name: lost for body in structure.bodies if body.free}
         if not VELOCITY.wrong(lost):
-            mended = replace(recording, test=replace(recording.test, initial_velocity=there))
-            yield f"initial_velocity is rather {lost / FASTER:.2g} to {lost:.2g} m/s", mended
+            yield f"initial_velocity is rather {lost / 2.0:.2g} to {lost:.2g} m/s", [_coming_at(recording, there)]
+
+
+def _slower(
+    structure: Structure, recordings: Sequence[Recording], which: Sequence[int]
+) -> Iterator[tuple[str, Sequence[Recording]]]:
+    """The recordings with the speeds of some that were stated in another unit, where as stated no body of these loses
+    all of its speed, and slower ones could lose what they do."""
+    lost = [max(map(abs, _changes_of_speed(structure, recordings[k]).values()), default=np.inf) for k in which]
+    stated = [_fastest(recordings[k]) for k in which]
+    of = f" of {recordings[which[0]].test.id}" if len(which) < len(recordings) else ""
+    for unit, factor in LARGER.items():
+        most = min(1.0, FASTER / factor)
+        if all(change < most * speed for change, speed in zip(lost, stated, strict=True)):
+            mended = list(recordings)
+            for k in which:
+                speeds = recordings[k].test.initial_velocity
+                mended[k] = _coming_at(recordings[k], {name: speed / factor for name, speed in speeds.items()})
+            yield f"initial_velocity{of} is stated in {unit} instead of m/s", mended
+
+
+def _coming_at(recording: Recording, speeds: Mapping[str, float]) -> Recording:
+    return replace(recording, test=replace(recording.test, initial_velocity=speeds))
 
 
 def _times(recording: Recording, names: Sequence[str], factor: float) -> Recording:
@@ -165,13 +218,13 @@ def _fastest(recording: Recording) -> float:
 
 
 def _model(
-    structure: Structure, recording: Recording, effects: Mapping[str, Effect], hopeless: float = np.inf
+    structure: Structure, recordings: Sequence[Recording], effects: Mapping[str, Effect], hopeless: float = np.inf
 ) -> Model:
-    structure, recordings = with_accelerations(structure, [recording])
+    structure, recordings = with_accelerations(structure, recordings)
     return model_as_stated(structure, recordings, effects, hopeless)
 
 
-def _left(model: Model) -> list[float]:
+def _most_left(model: Model) -> list[float]:
     """Of each recording the largest share of any channel's mean square."""
     pairs = zip(model.records, model.residuals.residual, strict=True)
     return [
