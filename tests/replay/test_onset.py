@@ -49,6 +49,21 @@ def test_a_shifted_time_zero_is_found_within_two_samples(name):
         assert_array_equal(again.values, recording.values)
 
 
+@pytest.mark.parametrize("power", [1.0, 1.3])
+def test_a_gentle_rise_out_of_the_noise_is_not_told_to_begin_late(power):
+    """Pulses of 30 g and 160 ms in 1 g of noise, that rise with a power of time: it began where nothing was looked for,
+    4 ms before the alarm, and 36 and 21 of these 40 were told to begin 1 to 7 ms late."""
+    time = np.arange(-150, 500) / 5e3
+    pulse = np.sin(np.pi * np.clip(time / 0.16, 0.0, 1.0)) ** power
+    channels = (Channel("car_ax", "acceleration", "car", "x"), Channel("barrier_fx", "force", "barrier", "x"))
+    told = 0
+    for seed in range(40):
+        noise = np.random.default_rng(seed).standard_normal((len(time), 2))
+        values = (np.column_stack([-300.0 * pulse, 300.0 * pulse]) + 10.0 * noise) * [1.0, 1300.0]
+        told += find_onset(Recording(Test("car", channels), np.round(time * 1e9).astype(np.int64), values)).differs
+    assert told <= 2
+
+
 @pytest.mark.parametrize("name", SIMULATED)
 @pytest.mark.parametrize("ms", [1.0, 2.0, 5.0])
 def test_a_record_that_begins_hardly_before_the_impact_has_no_onset(name, ms):

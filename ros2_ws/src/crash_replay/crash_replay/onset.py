@@ -1,6 +1,7 @@
 """When the impact begins, found from the signals themselves: a two-phase regression over all channels at once.
 
-What is found does not depend on the stated time zero.
+What is found does not depend on the stated time zero, but where the first instant that was tried fits almost as well as
+the best: sought farther back, too, an onset that does not contradict the stated time zero is taken instead.
 
 1. Noise. Each acceleration and force has its mean and standard deviation from the record's first samples, at rest;
    noise whose neighbours are alike counts for as much less, by how means over a run scatter there. A car that rolls
@@ -110,9 +111,22 @@ def _onset_of_any(recording: Recording) -> Onset | None:
     alarm = _first_alarm(recording, quiet, period)
     if alarm is None:
         return None
-    back, ahead = _around(alarm.run, period)
-    start = max(quiet // 2, alarm.first - back)
-    candidates = np.arange(start, min(alarm.first + alarm.run, len(recording) - LEAST_RUN))
+    back, _ = _around(alarm.run, period)
+    found, may_be_earlier = wider, _ = _change_point(recording, alarm, quiet, back)
+    while wider.differs and may_be_earlier:
+        back *= 2
+        wider, may_be_earlier = _change_point(recording, alarm, quiet, back)
+    return found if wider.differs else wider
+
+
+def _change_point(recording: Recording, alarm: _Alarm, quiet: int, back: int) -> tuple[Onset, bool]:
+    """And whether the first instant that was tried fits almost as well, so that it may be earlier; back: samples before
+    the alarm in which it is sought."""
+    period = recording.sample_period
+    _, ahead = _around(alarm.run, period)
+    candidates = np.arange(
+        max(quiet // 2, alarm.first - back), min(alarm.first + alarm.run, len(recording) - LEAST_RUN)
+    )
     columns = np.array([alarm.columns[k] for k in alarm.woken])
     costs = _change_costs(columns, candidates, min(alarm.first + ahead, len(recording)))
     sample = int(candidates[np.argmin(costs)])
@@ -120,7 +134,8 @@ def _onset_of_any(recording: Recording) -> Onset | None:
     time_ns = int(recording.time_ns[sample])
     precision = int(max(np.abs(recording.time_ns[almost] - time_ns).max(), alarm.gentle * alarm.run * period * 1e9))
     differs = abs(time_ns) > max(DIFFERS * period * 1e9 + 1.0, precision)
-    return Onset(time_ns, sample, tuple(recording.test.channels[k].name for k in alarm.woken), precision, differs)
+    woken = tuple(recording.test.channels[k].name for k in alarm.woken)
+    return Onset(time_ns, sample, woken, precision, differs), candidates[0] == almost[0] and candidates[0] > quiet // 2
 
 
 def _begins_moving(recording: Recording, quiet: int) -> bool:
