@@ -1,5 +1,7 @@
 """Simulated recordings with a hidden effect: the mechanics have what is said to be hidden, the model does not tell."""
 
+from itertools import cycle
+
 import numpy as np
 import pytest
 from helpers_synthetic import drawn, model_of, recorded
@@ -34,13 +36,12 @@ PARALLEL = {
 }
 
 
-PAIRS = ("frontal", "side"), ("impactor", "dummy")
-IN_TWO = [(pair[n % 2], effect) for n, effect in enumerate(ON_ELEMENTS) for pair in PAIRS]
-"""Each effect in two structures of four, each structure with every other effect."""
+STRUCTURE_OF = dict(zip(ON_ELEMENTS, cycle(("impactor", "dummy", "frontal", "side"))))
+"""Each effect in one structure, each structure with three of them."""
 
 
-@pytest.mark.parametrize(("structure", "effect"), IN_TWO)
-def test_element_carries_what_the_truth_file_says_and_the_hidden_effect(structure, effect):
+@pytest.mark.parametrize(("effect", "structure"), STRUCTURE_OF.items())
+def test_element_carries_what_the_truth_file_says_and_the_hidden_effect(effect, structure):
     _, truth, content = recorded(structure, effect)
     (hidden,) = content["hidden"]
     element, found = content["elements"][hidden["target"]], truth.elements[hidden["target"]]
@@ -110,15 +111,15 @@ def test_body_feels_the_hidden_effect(structure, effect):
             assert_allclose(grown[-50:][np.isfinite(grown[-50:])], c, rtol=1e-9)
 
 
-NOT_DRIVEN = {("dummy", effect): {"at": "rib_ay"} for effect in ("channel_gain", "channel_offset")}
-"""Where a driven channel would be drawn, of which it takes 90 simulations to know whether its error shows: a delay's
-does for all three, and they err alike wherever they are."""
+AT = {("dummy", effect): "rib_ay" for effect in ("channel_delay", "channel_gain", "channel_offset")}
+"""Where a driven channel would be drawn, of which it takes 90 simulations to know whether its error shows: they err
+alike wherever they are, and that it must show is asked of the cases."""
 
 
-@pytest.mark.parametrize("structure", ["frontal", "side", "dummy"])
+@pytest.mark.parametrize("structure", ["frontal", "dummy"])
 @pytest.mark.parametrize("effect", ["channel_delay", "channel_gain", "channel_offset", "rotation"])
 def test_sensor_errs_as_hidden(structure, effect):
-    recording, truth, content = recorded(structure, effect, **NOT_DRIVEN.get((structure, effect), {}))
+    recording, truth, content = recorded(structure, effect, at=AT.get((structure, effect), ""))
     (hidden,) = content["hidden"]
     name = hidden["target"] if effect != "rotation" else f"{hidden['target']}_a{recording.test.channels[0].axis}"
     sensor = next(s for s in truth.scenario.sensors if s.channel.name == name)

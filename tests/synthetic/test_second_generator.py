@@ -8,10 +8,11 @@ from helpers_modules import modules_after
 from helpers_paths import PACKAGES
 from numpy.testing import assert_allclose, assert_array_equal
 
+from crash_replay.second_generator import cases
 from crash_replay.second_generator.cases import NOTHING, SEEN, Case, CaseError, case_of, drawn
 from crash_replay.second_generator.forms import FORMS, wrong_channel
 from crash_replay.second_generator.plan import COUNTS, DEVELOPMENT, SEEDS, kind_of, plan
-from crash_replay.second_generator.sensors import cfc
+from crash_replay.second_generator.sensors import Sensors, cfc
 from crash_replay.second_generator.structures import STRUCTURES, G
 
 SEED = DEVELOPMENT + 700_000
@@ -78,7 +79,10 @@ def test_another_seed_is_another_case():
     assert other.model_text != one.model_text
 
 
-def test_what_is_hidden_changes_the_recording_by_more_than_the_noise():
+def test_what_is_hidden_changes_the_recording_by_more_than_the_noise(monkeypatch):
+    """At the nominal speed alone: what shows there shows in two recordings."""
+    monkeypatch.setattr(cases, "SPEEDS", (1.0,))
+    monkeypatch.setattr(Sensors, "record", lambda *given: [])  # only how large it is
     for n, (name, form) in enumerate(FORMS.items()):
         if name == "body.engine":  # it changes the model, not the recording
             continue
