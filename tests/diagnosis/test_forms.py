@@ -45,7 +45,6 @@ def written(found: Diagnosis, model: str, folder) -> Structure:
         ("sled/cubic.inside/0.5g/clean/71700003", "in_curve", "nothing"),
         ("wall/cubic.beside/0.5g/clean/71700004", "", "springs"),
         ("side/damper.metered/1g/clean/71700005", "metered", "nothing"),
-        ("cab/limit.plastic/1g/clean/71900000", "plastic", "nothing"),
         ("cab/limit.plastic/1g/clean/34000268", "plastic", "nothing"),  # of a body that pushes on others as well
         ("side/limit.plastic/2g/clean/36000074", "plastic", "nothing"),  # whose usual fits end at a kink
         ("cab/limit.foam/0.5g/clean/72000000", "smooth", "nothing"),
