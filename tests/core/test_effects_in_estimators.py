@@ -147,7 +147,7 @@ def test_every_method_honours_an_effect_known_or_not(method):
     index = description.parameters.index(parameter_of("coulomb_friction", what.target))
     assert_allclose(last.parameters[index], what.coefficient, rtol=1e-12)  # afmm's is a mean of equal values
     assert last.std[index] < 1e-9 * what.coefficient and last.status[index] == ParameterStatus.KNOWN
-    if "gauss_newton" not in method:  # for those see below
+    if "gauss_newton" not in method:  # for one of those see below
         assert known < 0.9 * without
     unknown, description, last = median_innovation(method, "unknown")
     assert description.parameter_units[index] == "N"
@@ -157,12 +157,12 @@ def test_every_method_honours_an_effect_known_or_not(method):
         assert unknown < 0.1 * without
 
 
-@pytest.mark.parametrize("method", ["gauss_newton", "gauss_newton_orders"])
-def test_a_known_friction_helps_one_with_a_noise_model_too(method):
-    """The mean of four draws: the noise model takes up much of what a friction leaves, in one of them nearly all."""
+def test_a_known_friction_helps_one_with_a_noise_model_too():
+    """The mean of four draws: the noise model takes up much of what a friction leaves, in one of them nearly all. A
+    bank of such estimators says what one of them does."""
     ratios = []
     for seed in range(SEED, SEED + 4):
-        known, without = (median_innovation(method, friction, seed)[0] for friction in ("known", "none"))
+        known, without = (median_innovation("gauss_newton", friction, seed)[0] for friction in ("known", "none"))
         ratios.append(known / without)
     assert np.exp(np.mean(np.log(ratios))) < 0.9, ratios
 
@@ -186,7 +186,7 @@ def test_a_known_coefficient_of_zero_changes_nothing(method):
 
 
 def test_a_damper_from_an_effect_is_the_model_s_own_damper():
-    recording = oscillator_recording(noise=0.3)
+    recording = oscillator_recording(noise=0.3, n=100)
     known = add_effect(oscillator(), "viscous_damping", "spring", coefficient=50.0)
     own = oscillator(damping=Coefficient(50.0))
     for method in ("rls", "constrained_kalman", "gauss_newton"):
