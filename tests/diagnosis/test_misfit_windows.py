@@ -17,7 +17,7 @@ def in_m_per_s2(monkeypatch):
     monkeypatch.setattr(module, "output_scale", lambda layout: np.ones(len(layout.outputs)))
 
 
-def windows(left: np.ndarray, apart: float = 0.0, unloads: float = 0.0, seed: int = 1):
+def windows(left: np.ndarray, apart: bool | np.ndarray = False, unloads: bool | np.ndarray = False, seed: int = 1):
     """Of one body that leaves (n,) beside white noise of 3 m/s^2."""
     residual = left + np.random.default_rng(seed).normal(0.0, NOISE, SAMPLES)
     time, at = DT * np.arange(SAMPLES), np.arange(SAMPLES)
@@ -27,7 +27,9 @@ def windows(left: np.ndarray, apart: float = 0.0, unloads: float = 0.0, seed: in
     record = SimpleNamespace(
         time=time, at=at, period=DT, measured=residual[:, None] + 7.0, test=SimpleNamespace(id="T")
     )
-    acting = SimpleNamespace(force=force, apart=np.full(SAMPLES, apart), unloads=np.full(SAMPLES, unloads))
+    acting = SimpleNamespace(
+        force=force, apart=np.broadcast_to(apart, SAMPLES), unloads=np.broadcast_to(unloads, SAMPLES)
+    )
     residuals = SimpleNamespace(
         residual=[residual[:, None]], noise=[np.array([NOISE])], links=[[acting]],
         predicted=[np.full((SAMPLES, 1), 7.0)],
@@ -52,12 +54,23 @@ def test_what_stands_out_is_found_where_it_is_and_as_large_as_it_is(size):
 
 
 @pytest.mark.parametrize(
-    ("apart", "unloads", "state"), [(0.0, 0.0, "loading"), (0.0, 1.0, "unloading"), (1.0, 1.0, "apart")]
+    ("apart", "unloads", "state"), [(False, False, "loading"), (False, True, "unloading"), (True, True, "apart")]
 )
 def test_what_the_element_does_meanwhile_is_told(apart, unloads, state):
     left = np.zeros(SAMPLES)
     left[800:1200] = 10.0 * NOISE
     assert [window.state for window in windows(left, apart, unloads)] == [state]
+
+
+def test_a_window_ends_where_the_element_does_something_else():
+    """A whole crash was told as one window, and as what the element did for the longer part of it."""
+    time = np.arange(SAMPLES)
+    left = np.where((time >= 400) & (time < 1600), 10.0 * NOISE, 0.0)
+    unloads = (time >= 900) & ~((time >= 1200) & (time < 1205))  # for less than a window not
+    found = windows(left, time >= 1500, unloads)
+    assert [window.state for window in found] == ["loading", "unloading", "apart"]
+    assert_allclose([window.start for window in found[1:]], [0.09, 0.15], rtol=1e-12)
+    assert_allclose([window.end for window in found[:-1]], [0.0899, 0.1499], rtol=1e-12)
 
 
 def test_where_nothing_is_valid_nothing_fails():
