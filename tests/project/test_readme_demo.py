@@ -43,7 +43,7 @@ def test_without_a_display_it_says_where_a_browser_finds_it(simulated):
 
 
 STORY = (
-    "all samples: effect missing", "where it fails: rib, loading", "what it lacks: coulomb_friction on rib_spine",
+    "all samples: effect missing", "where it fails: rib, unloading", "what it lacks: coulomb_friction on rib_spine",
     "the error falls", "verdict with it: adequate",
 )  # fmt: skip
 
