@@ -112,7 +112,8 @@ def _onset_of_any(recording: Recording) -> Onset | None:
     if alarm is None:
         return None
     back, _ = _around(alarm.run, period)
-    found, may_be_earlier = wider, _ = _change_point(recording, alarm, quiet, back)
+    found, may_be_earlier = _change_point(recording, alarm, quiet, back)
+    wider = found
     while wider.differs and may_be_earlier:
         back *= 2
         wider, may_be_earlier = _change_point(recording, alarm, quiet, back)
