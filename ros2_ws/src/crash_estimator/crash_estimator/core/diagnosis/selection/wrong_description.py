@@ -81,7 +81,7 @@ def _in_the_worst(
     alone = [_model(structure, [recording], effects) for recording in recordings]
     worst = int(np.argmax([max(_most_left(model)) for model in alone]))
     recording = recordings[worst]
-    others = [*_other_speeds(structure, recording), *_slower(structure, recordings, [worst])]
+    others = [*_other_speeds(structure, recording), *_slower(structure, [recording], [0])]
     if not given.untouched:  # else it is as likely the structure that is the wrong way round
         others += _other_channels(structure, recording)
     return _Doubt(alone[worst], others)
