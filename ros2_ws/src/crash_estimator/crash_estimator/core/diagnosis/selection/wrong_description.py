@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.constants import kmh, mph
 
 from crash_replay.gravity import G
 from crash_replay.limits import VELOCITY
@@ -31,8 +32,8 @@ FASTER = 2.2
 """Times the largest speed in a test that a body may change its own by, and times the momentum at that speed that forces
 may take: 2 when thrown back as fast as they came, and a tenth for what noise and a sensor's gain add to that."""
 
-LARGER = {"km/h": 3.6, "mph": 3.6 / 1.609344}
-"""Unit that a speed may be stated in -> by what the number is larger than in m/s."""
+SPEEDS = {"km/h": kmh, "mph": mph}
+"""Unit that a speed may be stated in -> m/s."""
 
 
 class _Doubt(NamedTuple):
@@ -160,13 +161,13 @@ def _slower(
     lost = [max(map(abs, _changes_of_speed(structure, recordings[k]).values()), default=np.inf) for k in which]
     stated = [_fastest(recordings[k]) for k in which]
     of = f" of {recordings[which[0]].test.id}" if len(which) < len(recordings) else ""
-    for unit, factor in LARGER.items():
-        most = min(1.0, FASTER / factor)
+    for unit, one in SPEEDS.items():
+        most = min(1.0, FASTER * one)
         if all(change < most * speed for change, speed in zip(lost, stated, strict=True)):
             mended = list(recordings)
             for k in which:
                 speeds = recordings[k].test.initial_velocity
-                mended[k] = _coming_at(recordings[k], {name: speed / factor for name, speed in speeds.items()})
+                mended[k] = _coming_at(recordings[k], {name: one * speed for name, speed in speeds.items()})
             yield f"initial_velocity{of} is stated in {unit} instead of m/s", mended
 
 
