@@ -10,7 +10,8 @@ from scipy.integrate import quad
 from scipy.interpolate import PchipInterpolator
 
 from crash_replay.synthetic.curves import Curve, constant, stepped
-from crash_replay.synthetic.forces import Spring
+from crash_replay.synthetic.forces import Slip, Spring
+from crash_replay.synthetic.hidden.laws import vented_gas
 from crash_replay.synthetic.integrate import simulate
 from crash_replay.synthetic.recordings import BUILDERS
 from crash_replay.synthetic.system import Body, Element, Motion, System
@@ -113,6 +114,16 @@ def test_damper_takes_what_the_motion_loses():
     lost = np.trapezoid(200.0 * history.rate[:, 0] ** 2, history.time)
     assert_allclose(energy[0] - energy[-1], lost, rtol=1e-5)
     assert (np.diff(energy) <= 1e-9).all()
+
+
+def test_a_gas_without_a_hole_is_pressed_to_many_times_the_pressure_outside():
+    """As its equation has it, F = c ((1 - X / L)^-1.4 - 1): nothing holds its memory back, as yielding does."""
+    c, length = 30.0, 0.5
+    bag = Element("bag", ("block", "wall"), Spring(constant(0.0)), slip=Slip(c, vented_gas(length, 0.0)))
+    history = simulate(System((Body("block", 10.0, 2.0), Body("wall")), (bag,)), np.linspace(0.0, 0.3, 31))
+    expected = c * ((1.0 - history.crush[:, 0] / length) ** -1.4 - 1.0)
+    assert expected.max() > 2.0 * c
+    assert_allclose(history.force[:, 0], expected, atol=1e-4 * c)
 
 
 def test_plastic_contact_rebounds_slower_than_it_came_and_leaves():

@@ -9,6 +9,7 @@ callable of that kind, so an effect to be added is one small function, for insta
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 
 from .curves import Curve
 
@@ -20,8 +21,9 @@ Law = Callable[[float, float, float], float]
 class Slip:
     """A force beside the spring with a memory s of its own, force times s, that follows ds/dt = flow(s, X, V)."""
 
-    force: float  # N, at which it yields; N/m where s is a crush
+    force: float  # N; N/m where s is a crush
     flow: Callable[[float, float, float], float]  # (s, crush m, rate m/s) -> ds/dt
+    largest: float = inf  # |s| at which it yields, of which no step goes beyond
     both_ways: bool = True  # False: it lets go where the element is apart, and stays as it was
 
 

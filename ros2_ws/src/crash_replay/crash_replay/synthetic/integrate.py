@@ -55,6 +55,7 @@ class _Equations:
         self.links = [(a, b, element.force) for (a, b), element in zip(system.ends(), system.elements)]
         self.slips = [element.slips if element.slip else None for element in system.elements]
         self.remembers, self.nothing = any(self.slips), [0.0] * len(self.links)
+        self.yields = [element.slip.largest if element.slip else 0.0 for element in system.elements]
 
     def crush(self, x: list[float]) -> list[float]:
         return [x[a] - x[b] for a, b, _ in self.links]
@@ -126,7 +127,8 @@ def _step(equations: _Equations, node: int, state: State, h: float) -> State:
     a4, f4 = acceleration(node + 2, x4, v4, peak, s4), flow(x4, v4, s4)
     x_end, v_end = _moved(x, sixth, _weighted(v, v2, v3, v4)), _moved(v, sixth, _weighted(a1, a2, a3, a4))
     if equations.remembers:
-        s = [min(max(slipped, -1.0), 1.0) for slipped in _moved(s, sixth, _weighted(f1, f2, f3, f4))]
+        moved = _moved(s, sixth, _weighted(f1, f2, f3, f4))
+        s = [min(max(slipped, -largest), largest) for slipped, largest in zip(moved, equations.yields)]
     return State(x_end, v_end, equations.largest(peak, x_end), s)
 
 

@@ -67,7 +67,7 @@ def hysteresis(specimen, peaks, target, share, rng):
         flow, shape = laws.bouc_wen(yields, exponent), {"yield_crush": yields, "exponent": exponent}
     else:
         flow, shape = laws.two_sliders(yields, 0.5), {"yield_crush": yields}
-    slip = Slip(c, flow, both_ways=specimen.element(target).spring.tension)
+    slip = Slip(c, flow, largest=1.0, both_ways=specimen.element(target).spring.tension)
     elements = [replace(e, slip=slip) if e.name == target else e for e in specimen.scenario.system.elements]
     return specimen.with_parts(elements=elements), Hidden("hysteresis", target, c, "N", shape)
 
