@@ -17,6 +17,7 @@ from ..selection.candidate_fits import CandidateFit
 from ..selection.fitted_model import Model
 from ..selection.selection_step import SelectionStep
 from ..selection.thresholds import THRESHOLDS
+from .over_forms import std_over_forms
 
 ACTS = 0.05
 """A barrier's force and inertias are compared while the force is above this share of its peak."""
@@ -163,7 +164,9 @@ def step_of(
 ) -> StepReport:
     """free_run_rms: of the two models' free runs; of_all: the fit with all that was added."""
     best = step.candidates[0]
-    value, std, shape = stated(of_all.layout.term(best.addition), of_all)
+    term = of_all.layout.term(best.addition)
+    value, std, shape = stated(term, of_all)
+    std = std_over_forms(term, of_all) if best.addition.effect.remembers else std
     floor = noise_floor(before.fit.layout, before.records)
     changed = best.fit if step.before.fit.problem.noise_is_inflated else after.fit
     return StepReport(

@@ -110,9 +110,11 @@ def coefficient(addition: Addition, fitted: Fit) -> float:
 
 
 def among_variants(addition: Addition, gain: float) -> float:
-    """Among an effect's own variants: an unmodelled body that was counted in with another must gain more.
+    """Among an effect's own variants: a form other than the usual one of a force that remembers must gain more, and so
+    must an unmodelled body that was counted in with another.
 
-    Without a measured force nothing tells it from one beside the model's masses: halving every force and mass leaves
-    the motion as it is.
+    Without a measured force nothing tells that one from one beside the model's masses: halving every force and mass
+    leaves the motion as it is.
     """
-    return gain - (THRESHOLDS.gain if addition.taken_from else 0.0)
+    unusual = addition.taken_from or (addition.variant and addition.effect.remembers)
+    return gain - (THRESHOLDS.gain if unusual else 0.0)

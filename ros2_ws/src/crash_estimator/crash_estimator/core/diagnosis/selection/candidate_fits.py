@@ -68,6 +68,7 @@ def begin(magnitudes: Magnitudes, effects: Mapping[str, Effect], model: Model, l
     search = _Search(magnitudes, model, by_fit, least)
     search.from_motion(shortlist(by_motion, THRESHOLDS.shortlist))
     search.from_model(shortlist([one for one in by_fit if one.gain > 0.0], THRESHOLDS.shortlist))
+    search.remembered_otherwise()
     return search
 
 
@@ -136,6 +137,17 @@ class _Search:
         best = {one.addition.key for one in self._best()}
         ways = [one for one in self.screened if len(one.addition.effect.variants) > 1 or one.addition.recording]
         self.from_motion(one for one in ways if one.addition.key in best)
+
+    def remembered_otherwise(self) -> None:
+        """Fit the best one, if it is a force that remembers, in its other forms from where its fit has ended: to a
+        screening they are much the same."""
+        best = self.ranking()[0] if self.found else None
+        if best is None or best.fit is None or not best.addition.effect.remembers:
+            return
+        for form in (one for one in best.addition.effect.variants if one != best.addition.variant):
+            addition = replace(best.addition, variant=form)
+            problem = self._problem(addition)
+            self._note(addition, fit(problem, problem.moved(*best.fit.point)))
 
     def _extended(self, addition: Addition) -> None:
         """With what an unmodelled body pushes: the rest of its balance may go to any body that it may touch."""
