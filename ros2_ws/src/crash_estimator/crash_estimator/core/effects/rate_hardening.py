@@ -55,9 +55,10 @@ class Hardening(StaticFactor):
 
     def is_doubt(self, magnitudes, addition, c, shapes, fitted):
         """The largest exponent: the force hardly hangs on the rate, as that of a spring of rings, whose friction asks
-        only which way it moves."""
-        # 0.999: a fit ends at a limit but for rounding
-        return shapes.get("exponent", 0.0) > 0.999 * self.shapes["exponent"].high
+        only which way it moves. The smallest: it stands for what the spring itself lacks, as a softening one."""
+        limits = self.shapes["exponent"]
+        # 1.001, 0.999: a fit ends at a limit but for rounding
+        return not 1.001 * limits.low < shapes.get("exponent", 1.0) < 0.999 * limits.high
 
 
 EFFECT = Hardening(
