@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from crash_estimator.core.diagnosis import THRESHOLDS, diagnose
-from crash_estimator.core.diagnosis.parameterization.layout import FARTHEST
+from crash_estimator.core.diagnosis.parameterization.nuisances import FARTHEST
 from crash_estimator.core.diagnosis.selection import onset_search
 from crash_estimator.core.diagnosis.selection.onset_search import Begun
 from crash_estimator.core.diagnosis.selection.time_zero import Shift

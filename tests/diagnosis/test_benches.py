@@ -3,12 +3,15 @@
 The cart is simulated here, in steps of 50 us; friction sticks (Karnopp). An encoder shows it at 200 Hz.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from crash_estimator.core.diagnosis import diagnose
 from crash_estimator.core.diagnosis.report import diagnosis
 from crash_estimator.core.diagnosis.report.verdict import Verdict
+from crash_estimator.core.effects.applied import applied
 from crash_estimator.core.structure import Body, Coefficient, Element, Structure
 from crash_replay.gravity import G
 from crash_replay.recording import Channel, Recording, Test
@@ -16,21 +19,47 @@ from crash_replay.recording import Channel, Recording, Test
 MASS, STIFFNESS, DAMPING, LET_GO_AT = 0.6, 400.0, 0.6, 0.03
 
 
-def swing(friction: float, damping: float = DAMPING, noise: float = 5e-6) -> Recording:
-    """4 s, some 16 periods."""
+def swing(
+    friction: float, damping: float = DAMPING, noise: float = 5e-6, rebound: float = 1.0, relaxing=(0.0, 1.0)
+) -> Recording:
+    """4 s, some 16 periods; rebound: times as much damping where the cart moves away from the wall; relaxing: stiffness
+    of a spring behind a damper, and its time. The cart was held for long."""
     step, every = 5e-5, 100
-    x, v, shown = LET_GO_AT, 0.0, []
+    x, v, relaxed, shown = LET_GO_AT, 0.0, 0.0, []
     for k in range(int(4.0 / step)):
         if k % every == 0:
             shown.append(x)
-        rest = -STIFFNESS * x - damping * v
+        rest = -STIFFNESS * x - damping * (v if v > 0.0 else rebound * v) - relaxed
         sticks = abs(v) < 1e-4 and abs(rest) <= friction
         v = 0.0 if sticks else v + step * (rest - friction * np.sign(v or rest)) / MASS
         x += step * v
+        relaxed += step * (relaxing[0] * v - relaxed / relaxing[1])
     measured = np.array(shown) + np.random.default_rng(3).normal(0.0, noise, len(shown))
     at = {"initial_displacement": {"cart": LET_GO_AT}, "initial_velocity": {"cart": 0.0}}
     test = Test("swing", (Channel("cart_x", "displacement", "cart", "x"),), **at)
     return Recording(test, np.arange(len(shown)) * 5_000_000, measured[:, None])
+
+
+def test_a_damper_with_valves_is_told_where_the_model_has_one_without():
+    """It takes that one's place: of an even damper and an uneven one together no recording tells either."""
+    swung, model = swing(0.0, rebound=3.0), undamped("constant")
+    even = replace(model.elements[0], damping=Coefficient(1.0, estimated=True, min=0.0, shape="constant"))
+    model = replace(model, elements=(even,))
+    found = diagnose(model, [swung])
+    assert named(found) == {"viscous_damping": pytest.approx(DAMPING, rel=0.02)} and found.complete
+    (step,) = found.steps
+    assert (step.form, step.shape) == ("uneven", {"rebound": pytest.approx(3.0, rel=0.02)})
+    assert step.std < 0.02 * step.coefficient
+    assert {one.constant: one.value for one in found.constants}["damping"] == pytest.approx(0.0, abs=1e-3)
+    mended = replace(model, effects=found.structure.effects)
+    assert diagnose(mended, [swung]).verdict == "adequate"
+    assert applied(mended, swung.test).elements[0].damping == Coefficient()
+
+
+def test_a_body_that_was_held_for_long_is_let_go_of_with_what_relaxes_relaxed():
+    found = diagnose(undamped("constant"), [swing(0.0, damping=0.0, relaxing=(200.0, 0.03))])
+    assert named(found) == {"maxwell_element": pytest.approx(200.0, rel=0.03)} and found.complete
+    assert found.steps[0].shape == {"relaxation_time": pytest.approx(0.03, rel=0.03)}
 
 
 def undamped(shape: str) -> Structure:

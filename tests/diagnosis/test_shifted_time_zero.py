@@ -9,7 +9,7 @@ from crash_estimator.benchmarks.effects_judge import drawn
 from crash_estimator.benchmarks.effects_plan import case_of
 from crash_estimator.benchmarks.second_judge import judge, right
 from crash_estimator.core.diagnosis import diagnose
-from crash_estimator.core.diagnosis.parameterization.layout import FARTHEST
+from crash_estimator.core.diagnosis.parameterization.nuisances import FARTHEST
 from crash_estimator.core.diagnosis.selection import onset_search
 from crash_estimator.core.diagnosis.selection.time_zero import RISES, Shift, coasting, touching
 from crash_estimator.core.effects import EFFECTS

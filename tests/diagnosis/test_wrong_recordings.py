@@ -16,6 +16,7 @@ from crash_estimator.core.diagnosis.selection.onset_search import _Search
 from crash_estimator.core.diagnosis.selection.time_zero import Shift, TimeZero
 from crash_estimator.core.effects import EFFECTS
 from crash_estimator.core.effects.applied import applied
+from crash_estimator.core.effects.effect import Addition
 from crash_estimator.core.kinematics import initial_motion
 from crash_estimator.core.structure import Body, Coefficient, EffectSpec, Element, ModelError, Structure
 from crash_estimator.model_file import load_model
@@ -101,6 +102,18 @@ def test_what_a_load_cell_behind_an_element_does_not_show_is_offered_on_the_grou
     bodies = Body("sled", 95.0, ("sled_ax",)), Body("frame", fixed=True, force="frame_fx")
     offered = EFFECTS["guide_friction"].candidates(Structure("rig", bodies, (post,)), magnitudes)
     assert [addition.target for addition in offered] == ["sled"]
+
+
+@pytest.mark.parametrize(("load_cell", "stands_on"), [("wall_fx", "ground_"), (None, "ground")])
+def test_a_load_cell_on_what_is_called_ground_feels_nothing_of_a_guide(load_cell, stands_on):
+    """A wall of that name had the friction of the car's wheels in its force, and a wrong speed was told."""
+    post = Element("post", ("car", "ground"), Coefficient(3e5, shape="constant"))
+    bodies = Body("car", 95.0, ("car_ax",)), Body("ground", fixed=True, force=load_cell)
+    model = Structure("rig", bodies, (post,), (EffectSpec("guide_friction", "car", 30.0, {"speed": 0.1}),))
+    assert applied(model, Test("t", ())).elements[-1].between == ("car", stands_on)
+    index = {"car": 0, "ground": 1, "ground_": 2}
+    link = EFFECTS["guide_friction"].own_link(Addition(EFFECTS["guide_friction"], "car"), model, index, [])
+    assert link.ends == (0, index[stands_on])
 
 
 def test_a_load_cell_s_zero_is_named_and_not_a_force():

@@ -45,7 +45,9 @@ def apply(found: Diagnosis, had: tuple[EffectSpec, ...], effects: dict[str, Effe
     """Write the model's file, comments and all, with the added effects at its end -> what was added."""
     yaml = YAML()
     content = yaml.load(model_path(model).read_text(encoding="utf-8"))
-    unloading = {spec.target for spec in found.structure.effects if effects[spec.type].replaces == "unloading"}
+    unloading = {
+        spec.target for spec in found.structure.effects if effects[spec.type].replaces(spec.variant) == "unloading"
+    }
     for element in found.structure.elements:
         if not element.damper_pulls:
             content["elements"][element.name]["damper_pulls"] = False
@@ -57,7 +59,7 @@ def apply(found: Diagnosis, had: tuple[EffectSpec, ...], effects: dict[str, Effe
     for spec, step in zip(added, found.effects_added, strict=True):
         entry = _entry(spec, effects[spec.type], list(content["bodies"]))
         if "coefficient" in entry:
-            replaces = effects[spec.type].replaces
+            replaces = effects[spec.type].replaces(spec.variant)
             instead = f", takes the place of the element's {replaces}" if replaces else ""
             entry.yaml_add_eol_comment(f"+- {step.std:.2g} {step.unit}{instead}", "coefficient")
         content["effects"].append(entry)

@@ -90,7 +90,6 @@ class Effect:
     balances_momentum: ClassVar[bool] = False  # it changes what masses and forces must add up to
     on_ground: ClassVar[bool] = False  # its link's other end
     changes_start: ClassVar[bool] = False  # bodies start faster than the test says
-    replaces: ClassVar[str] = ""  # the element's key in a model file that it takes the place of
 
     # How a diagnosis searches for it
     profiled: ClassVar[bool] = False  # its coefficient says when a force jumps to zero: the cost has a V over it
@@ -108,6 +107,10 @@ class Effect:
     def target_key(self, variant: str) -> str:
         """What it acts on in one of its variants, as a model file says it."""
         return self.acts_on
+
+    def replaces(self, variant: str) -> str:
+        """The element's key in a model file that it takes the place of, where it takes any."""
+        return ""
 
     def attaches_body(self, variant: str) -> bool:
         """Whether it brings a further body, driven by the channel that is the target."""

@@ -3,7 +3,8 @@
 V is the rate of crush in m/s, compression positive; c in N s/m, never negative: a damper takes energy out.
 
 Form `uneven`, of a damper with valves, as those of vehicles are: F = c V where V > 0, F = c rebound V where V < 0.
-With a check valve, which lets the fluid flow back freely, `rebound` is next to nothing.
+With a check valve, which lets the fluid flow back freely, `rebound` is next to nothing. It takes the place of a damping
+of the element that is estimated: of both together no recording tells c.
 
 Form `hunt_crossley`, of two bodies that touch, whose surface of contact grows as they press (Hunt and Crossley 1975,
 equation 9): F = c (|X| / 0.1 m)^exponent V, X the crush in m: c is that of a crush of 0.1 m. Damping so begins and ends
@@ -40,6 +41,7 @@ EFFECT = ElementForce(
     },
     force=force,
     doubles="damping",
+    includes=("uneven",),
     forms={"": (), "uneven": ("rebound",), "hunt_crossley": ("exponent",), "power": ("power",)},
 )
 """Limits of the rebound: a thousandth is nothing; the dampers of cars pull up to five times as hard as they push.

@@ -10,41 +10,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crash_replay.onset import AS_WELL
-
 from ...effects.effect import Addition
-from ...effects.kinds.body_inertia import WEIGHED_TO
-from ...effects.kinds.guide_force import GROUND
+from ...effects.kinds.guide_force import ground_of
 from ...structure import Coefficient, Structure
 from ..observation.grid import ATTACHED_MODES, DRIVEN_MODES
 from ..observation.pace import LONG
 from ..observation.record import ObservedRecord, Output, comparable, outputs_of
-from ..observation.trajectory import Trajectory
+from . import nuisances
 from .free_curve import ROUGHNESS, Curve, make_knots
 from .magnitudes import Magnitudes
-from .prior import LEAST_STD, Builder, Prior
+from .prior import Builder, Prior
 from .terms import Link, Term
 
 FREE, DRIVEN, FIXED = 0, 1, 2
 """How a body moves: by forces, as its channels say, or not at all. The compiled passes know these codes."""
 
-DRIFT = 0.003
-"""Of a channel's peak, standard deviation at the recording's end: the zero of an accelerometer that is shaken and warms
-up drifts by some 0.15 g in a crash of 50 g. Ours: at 0.002 three of 120 looked-at models that lack nothing, whose zeros
-drift by up to 0.2 g, were told an offset; at 0.003 none."""
-
-BEYOND_DOUBT = 3.0
-"""Standard deviations that such an error has at most: the usual three sigma. Halved, of 34 looked-at cases one
-that lacks nothing, whose zeros drift, is told an offset; doubled, none is told otherwise. And of the noise in the band
-that a channel has to pass to be rated: halved and doubled it changed nothing of what 36 looked-at cases were told."""
-
-START_ERRS = 0.3
-"""Of the velocity's standard deviation: wide, since a derivative at the end of a channel has half of the samples to go
-by, and the recording itself says soon enough how the body started. Halved it changed nothing of 34 looked-at cases."""
-
-FARTHEST = 2.0 * AS_WELL**0.5
-"""Standard deviations that an onset may be off: twice as far as any that fits its signals as well. And that a signal's
-mean may be off its zero where it is said to rest."""
+REPLACED = 1e-4
+"""Of its scale, standard deviation of a damping whose place an effect takes: as good as nothing. It stays a parameter, as
+what was found with it is gone on from. Of two looked-at dampers with valves a tenth changed nothing, ten times of it
+the sigmas, by 1.5 and 2."""
 
 
 class Layout(NamedTuple):
@@ -152,7 +136,7 @@ def make_layout(
     placed = [term.addition for term in terms]
     terms += [_term(b, one, magnitudes) for one in additions if not any(one is other for other in placed)]
     terms.sort(key=lambda term: next(k for k, addition in enumerate(additions) if addition is term.addition))
-    weighed = _weighed(b, structure) if records[0].in_doubt else {}
+    weighed = nuisances.weighed(b, structure) if records[0].in_doubt else {}
     common = len(b.parameters)
     outputs = comparable(outputs_of(structure), structure, records)
     offsets, drifts, modes, kicks, pushes, late = [], [], [], [], [], []
@@ -162,13 +146,13 @@ def make_layout(
         offsets.append(len(b.parameters))
         for q in range(len(outputs)):
             b.add("offset", 0.0, record.offset_std[q])
-        drifts.append(_drifts(b, outputs, record) if record.in_doubt else {})
-        modes.append(_modes(b, record, driven))
-        kicks.append(_kicks(b, structure, magnitudes.measured[r]))
+        drifts.append(nuisances.drifts(b, outputs, record) if record.in_doubt else {})
+        modes.append(nuisances.modes(b, record, driven))
+        kicks.append(nuisances.kicks(b, structure, magnitudes.measured[r]))
         slow = DRIVEN_MODES if record.time[-1] <= LONG else 0  # in a longer one they are slower than what moves
         pushed = [(k, (body.applied,), slow) for k, body in enumerate(structure.bodies) if body.applied]
-        pushes.append(_modes(b, record, pushed))
-        late.append(_late(b, record))
+        pushes.append(nuisances.modes(b, record, pushed))
+        late.append(nuisances.late(b, record))
     return Layout(
         structure, tuple(links), bodies, np.array(kind), outputs, knots, common, len(b.parameters), tuple(terms),
         attached, tuple(offsets), tuple(drifts), tuple(modes), tuple(kicks), tuple(pushes), tuple(late), weighed,
@@ -182,8 +166,9 @@ def _bodies(structure: Structure, attached: Iterable[str], additions: Sequence[A
         yield body.name, FREE if body.free else DRIVEN if body.driven else FIXED
     for channel in attached:
         yield channel, DRIVEN
-    if GROUND not in structure.body_index and any(one.effect.on_ground for one in additions):
-        yield GROUND, FIXED
+    ground = ground_of(structure)
+    if ground not in structure.body_index and any(one.effect.on_ground for one in additions):
+        yield ground, FIXED
 
 
 def _touch_name(addition: Addition) -> str:
@@ -210,9 +195,12 @@ def _element_link(b, k, element, index, curve, magnitudes, additions, terms) -> 
         # wide: what else carries beside it may push the other way, and a wide prior costs a nat. Halved, one gap of 60
         # looked-at cases was told as a stop; doubled, none was told otherwise
         constant = _constant(b, f"{element.name}.stiffness", stiffness, 3.0 * magnitudes.stiffness[k])
+    own = [a for a in additions if a.effect.acts_on == "element" and a.target == element.name]
     if damping.estimated:
-        rate = _constant(b, f"{element.name}.damping", damping, magnitudes.force[k] / magnitudes.rate[k])
-    here = [_term(b, a, magnitudes) for a in additions if a.effect.acts_on == "element" and a.target == element.name]
+        replaced = any(a.effect.replaces(a.variant) == "damping" for a in own)
+        scale = magnitudes.force[k] / magnitudes.rate[k] * (REPLACED if replaced else 1.0)
+        rate = _constant(b, f"{element.name}.damping", damping, scale)
+    here = [_term(b, addition, magnitudes) for addition in own]
     terms += here
     a, c = (index[end] for end in element.between)
     return Link(
@@ -250,50 +238,3 @@ def _term(b: Builder, addition: Addition, magnitudes: Magnitudes) -> Term:
         even = (high - low) / np.sqrt(12.0)  # as a flat prior between the limits has
         shapes[name] = b.add(f"{effect.name} {addition.target} {name}", start, even, 0.5 * (low + high), low, high)
     return Term(addition, coefficient, shapes)
-
-
-def _weighed(b: Builder, structure: Structure) -> dict[int, int]:
-    """Errors of the masses, where anything tells of them: of one body alone, M a = F hides a mass in the law."""
-    free = [k for k, body in enumerate(structure.bodies) if body.free]
-    told = len(free) > 1 or any(structure.bodies[k].fixed for k in structure.equations)
-    return {k: _bounded(b, f"{structure.bodies[k].name}.mass", WEIGHED_TO) for k in free if told}
-
-
-def _drifts(b: Builder, outputs: Sequence[Output], record: ObservedRecord) -> dict[int, int]:
-    """Zeros at the recording's end, of the accelerometers."""
-    felt = [q for q, output in enumerate(outputs) if output.quantity == "acceleration"]
-    peak = np.nanmax(np.abs(record.measured), axis=0)
-    return {q: _bounded(b, "drift", DRIFT * peak[q]) for q in felt}
-
-
-def _bounded(b: Builder, name: str, std: float) -> int:
-    """What a wrong model leaves is no reason for an error beyond its limits."""
-    limit = BEYOND_DOUBT * max(std, LEAST_STD)
-    return b.add(name, 0.0, std, low=-limit, high=limit)
-
-
-def _modes(b: Builder, record: ObservedRecord, by: Iterable[tuple[int, Sequence[str], int]]) -> dict[int, range]:
-    """Mean and so many slow cosines of the noise of channels whose mean moves or pushes a body: white noise spreads its
-    variance evenly over them. Where there are none a force's zero errs as its rest says: with the noise's own mean the
-    friction of an axis, recorded for 25 s, was told as 17.5 N for 20.4."""
-    found, samples = {}, len(record.at)
-    for k, channels, count in by:
-        noise = np.sqrt(sum(record.signals[c].noise ** 2 for c in channels)) / len(channels)
-        offset = np.sqrt(sum(record.signals[c].offset_std ** 2 for c in channels)) / len(channels)
-        found[k] = range(len(b.parameters), len(b.parameters) + 1 + count)
-        b.add("mode", 0.0, np.hypot(offset, noise / np.sqrt(samples)) if count else offset)
-        for _ in range(count):
-            b.add("mode", 0.0, noise * np.sqrt(2.0 / samples))
-    return found
-
-
-def _kicks(b: Builder, structure: Structure, measured: Trajectory) -> dict[int, int]:
-    """Errors of the velocities that bodies start with, where these are derivatives at the very end of a channel."""
-    own = (k for k, body in enumerate(structure.bodies) if body.starts_as_observed)
-    return {k: b.add("kick", 0.0, START_ERRS * float(np.std(measured.v[:, k]))) for k in own}
-
-
-def _late(b: Builder, record: ObservedRecord) -> int:
-    """How late bodies touch that coast until then, where that is not known; not before the record begins."""
-    limit = FARTHEST * record.impact_std
-    return b.add("late", 0.0, record.impact_std, low=-limit, high=limit) if record.impact_std else -1

@@ -24,7 +24,7 @@ def fitted_constants(fitted: Fit) -> tuple[FittedConstant, ...]:
     for link in (link for link in fitted.layout.links if link.name in elements):
         constants = [("stiffness", link.constant, "N/m"), ("damping", link.damping, "N*s/m")]
         if elements[link.name].unloading_slope:
-            lines = [term.coefficient for term in link.terms if term.addition.effect.replaces == "unloading"]
+            lines = [term.coefficient for term in link.terms if term.addition.effect.replaces("") == "unloading"]
             constants += [("unloading", p, "N/m") for p in lines]
         for constant, p, unit in constants:
             if p is not None:

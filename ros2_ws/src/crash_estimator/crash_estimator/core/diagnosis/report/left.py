@@ -7,7 +7,8 @@ import numpy as np
 from ...rating import rate
 from ..observation.whitening import filtered
 from ..output_error.normal_equations import may_diverge
-from ..parameterization.layout import BEYOND_DOUBT, Layout
+from ..parameterization.layout import Layout
+from ..parameterization.nuisances import BEYOND_DOUBT
 from ..residuals.in_band import SLOW_CLASSES, InBand, in_band, in_class, noise_in_class
 from ..residuals.residuals import rms
 from ..selection.fitted_model import Model

@@ -17,9 +17,9 @@ from ..observation.record import ObservedRecord, observe
 from ..observation.rest import rests_of
 from ..output_error.gauss_newton import fit
 from ..output_error.problem import make_problem
-from ..parameterization.layout import FARTHEST
 from ..parameterization.magnitudes import measure_magnitudes
 from ..parameterization.model_terms import additions_of
+from ..parameterization.nuisances import FARTHEST
 from ..residuals.residuals import Residuals, analyse
 from .acceptance import cost_of_noise, share_removed
 from .assumptions import as_given, select

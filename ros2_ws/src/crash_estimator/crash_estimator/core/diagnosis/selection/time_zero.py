@@ -20,7 +20,7 @@ from crash_replay.recording import Recording
 from crash_replay.time_unit import SECOND
 
 from ..output_error.gauss_newton import Fit
-from ..parameterization.layout import FARTHEST
+from ..parameterization.nuisances import FARTHEST
 from ..residuals.residuals import rms
 from .fitted_model import Model
 

@@ -1,6 +1,6 @@
 """A force in parallel to an element's own, a function of its motion."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...structure import CONTACT_FREQUENCY, ModelError
+from ...structure import CONTACT_FREQUENCY, Coefficient, ModelError
 from ..effect import Addition, Effect
 from ..estimator_model import ROUGHLY, coefficient_of, element_index, typical_motion, with_action, with_element
 
@@ -35,6 +35,7 @@ class ElementForce(Effect):
 
     force: Callable[..., np.ndarray] | None = None
     doubles: str = ""  # the element's coefficient that the usual form doubles: where it is estimated, others are left
+    includes: Sequence[str] = ()  # forms that are that coefficient and more: beside them, nothing is left to estimate
 
     function: ClassVar[str] = "force"
     in_parallel: ClassVar[bool] = True
@@ -42,6 +43,9 @@ class ElementForce(Effect):
     @property
     def variants(self):
         return ("", IN_CURVE) if self.of_crush_only and not self.forms else super().variants
+
+    def replaces(self, variant):
+        return self.doubles if variant in self.includes else ""
 
     def refuse(self, structure, spec):
         if spec.variant != PLASTIC:
@@ -56,6 +60,9 @@ class ElementForce(Effect):
 
     def put_to_work(self, structure, test, spec):
         k, force = element_index(structure, spec.target), partial(self.force, **spec.shape)
+        replaced = self.replaces(spec.variant)
+        if replaced and getattr(structure.elements[k], replaced).estimated:
+            structure = with_element(structure, spec.target, **{replaced: Coefficient()})
         if spec.variant == PLASTIC:
             slope = structure.elements[k].stiffness.value or structure.reduced_mass(k) * CONTACT_FREQUENCY**2
             structure = with_element(structure, spec.target, unloading=slope)

@@ -3,12 +3,23 @@
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from ...structure import Body, Coefficient, Element
+from ...structure import Body, Coefficient, Element, Structure
 from ..effect import OwnLink
 from .element_force import HALF, ElementForce, on_element
 
 GROUND = "ground"
 """A fixed body of this name, which is added where the model has none."""
+
+
+def ground_of(structure: Structure) -> str:
+    """Name of what a guide stands on: a fixed body of that name without a load cell, which shows what elements push it
+    with and nothing of guides, or one to be added."""
+    bodies = {body.name: body for body in structure.bodies}
+    name = GROUND
+    while name in bodies and not (bodies[name].fixed and not bodies[name].force):
+        name += "_"
+    return name
+
 
 PUSHED = 6.0
 """Nats that it must gain over a constant force, as any candidate over nothing: on a body that never comes back the two
@@ -23,16 +34,17 @@ class GuideForce(ElementForce):
     on_ground: ClassVar[bool] = True
 
     def possible_targets(self, structure, test):
-        return [body.name for body in structure.bodies if body.free and body.name != GROUND]
+        return [body.name for body in structure.bodies if body.free]
 
     def put_to_work(self, structure, test, spec):
-        ground = () if GROUND in structure.body_index else (Body(GROUND, fixed=True),)
-        guide = Element(f"{spec.target}-{GROUND}", (spec.target, GROUND), Coefficient(0.0, shape="constant"))
-        guided = replace(structure, bodies=(*structure.bodies, *ground), elements=(*structure.elements, guide))
+        ground = ground_of(structure)
+        added = () if ground in structure.body_index else (Body(ground, fixed=True),)
+        guide = Element(f"{spec.target}-{ground}", (spec.target, ground), Coefficient(0.0, shape="constant"))
+        guided = replace(structure, bodies=(*structure.bodies, *added), elements=(*structure.elements, guide))
         return super().put_to_work(guided, test, replace(spec, target=guide.name))
 
     def own_link(self, addition, structure, index, starts):
-        return OwnLink((index[addition.target], index[GROUND]), tension=True, origin=(), spring=False)
+        return OwnLink((index[addition.target], index[ground_of(structure)]), tension=True, origin=(), spring=False)
 
     def candidates(self, structure, magnitudes):
         """On bodies that no element holds both ways to a fixed one, as there friction in the element is the same; but

@@ -25,7 +25,9 @@ class UnloadingSlope(Effect):
 
     changes_law: ClassVar[bool] = True
     profiled: ClassVar[bool] = True
-    replaces: ClassVar[str] = "unloading"
+
+    def replaces(self, variant):
+        return "unloading"
 
     def put_to_work(self, structure, test, spec):
         if spec.coefficient is not None:
