@@ -40,7 +40,7 @@ def _pressed(gas, room, exponent):
 
 @njit(cache=True)
 def _in_one(y, before, now, step, length, leak, exponent):
-    """y after a short step from one crush to another, by the midpoint rule, and how it follows y, `now` and `before`."""
+    """y after a short step from one crush to another (midpoint rule), and its derivatives by y, `now` and `before`."""
     (first, by_before), (last, by_now) = _room(before, length), _room(now, length)
     dense = (1.0 + y) ** (1.0 / exponent)
     gas, gas_by_y = first * dense, first * dense / (exponent * (1.0 + y))
