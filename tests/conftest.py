@@ -3,8 +3,11 @@
 The imports are in the fixtures: what needs neither ROS nor the viewer does not wait for them.
 """
 
+import os
 import signal
+import sys
 from collections import Counter
+from unittest.mock import patch
 
 import pytest
 from helpers_graph import NEEDS_A_GRAPH
@@ -42,6 +45,29 @@ def pytest_collection_modifyitems(items):
     files = Counter(item.path for item in items)
     rank = {path: LONGEST.index(path.name) if path.name in LONGEST else len(LONGEST) for path in files}
     items.sort(key=lambda item: (rank[item.path], -files[item.path]))
+
+
+@pytest.fixture
+def node_ended(monkeypatch, capfd):
+    """node_ended(main, *arguments) -> exit status, output and errors of a program that cannot begin its work.
+
+    In this process: to start one takes more than all that it does, and one of each node is started in
+    tests/project/test_parameters.py.
+    """
+    from helpers_domain import own_domain
+
+    def end(main, *arguments) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", [main.__module__, *map(str, arguments)])
+        handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+        try:
+            with patch.dict(os.environ, {"ROS_DOMAIN_ID": str(own_domain())}):  # and all that a node adds to it
+                status = main()
+        finally:
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
+        return status, *capfd.readouterr()
+
+    return end
 
 
 @pytest.fixture

@@ -3,6 +3,6 @@
 import re
 
 NEEDS_A_GRAPH = re.compile(
-    r"\b(rclpy|crash_msgs|subprocess|stage)\b|helpers_(demo|diagnosis|domain|estimator_node|nodes|other_process|record|replay|service|waiting)"
+    r"\b(rclpy|crash_msgs|subprocess|stage|node_ended)\b|helpers_(demo|diagnosis|domain|estimator_node|nodes|other_process|record|replay|service|waiting)"
 )
 """What a file of tests mentions that starts nodes or other processes."""

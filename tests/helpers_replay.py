@@ -54,6 +54,15 @@ def environment() -> dict[str, str]:
     return {**os.environ, "ROS_DOMAIN_ID": str(DOMAIN)}
 
 
+def as_arguments(remap: Sequence[str] = (), **parameters) -> list[str]:
+    """Of a node's command line."""
+    words = ["--ros-args", *(word for rule in remap for word in ("-r", rule))]
+    for name, value in parameters.items():
+        shown = [str(one) for one in value] if isinstance(value, list) else value
+        words += ["-p", f"{name}:={str(shown).lower() if isinstance(shown, bool) else shown}"]
+    return words
+
+
 class OfTheTest:
     """A process that ends with the test."""
 
@@ -75,11 +84,8 @@ class Replay(OfTheTest):
 
     def __init__(self, bag=None, remap: Sequence[str] = (), **parameters):
         """remap: such as __ns:=/sled_a."""
-        command = [sys.executable, "-m", "crash_replay.replay_node", "--ros-args"]
-        command += [word for rule in remap for word in ("-r", rule)]
-        for name, value in {**({"bag": bag} if bag else {}), **parameters}.items():
-            shown = [str(one) for one in value] if isinstance(value, list) else value
-            command += ["-p", f"{name}:={str(shown).lower() if isinstance(shown, bool) else shown}"]
+        command = [sys.executable, "-m", "crash_replay.replay_node"]
+        command += as_arguments(remap, **({"bag": bag} if bag else {}), **parameters)
         self.errors = TemporaryFile()  # noqa: SIM115, closed when the process has ended
         pipes = {"stdout": subprocess.PIPE, "stderr": self.errors}
         self.process = subprocess.Popen(command, env=environment(), text=True, **pipes)

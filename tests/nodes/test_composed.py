@@ -28,13 +28,6 @@ def test_names_that_are_none_are_refused(names):
         names_in(names)
 
 
-def test_a_missing_parameter_is_one_line_that_names_it():
-    command = [sys.executable, "-m", "crash_estimator.nodes.composed", "kalman"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 1 and done.stderr.startswith("error: parameter model is not set: give a .yaml file")
-    assert done.stderr.count("\n") == 1
-
-
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """(composed or not) -> what the estimators said of a replay in lock-step."""

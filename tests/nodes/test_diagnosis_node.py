@@ -1,7 +1,5 @@
 """The diagnosis node: a ranking while samples come, the offline answer after the last, effects added and taken out."""
 
-import subprocess
-import sys
 from functools import partial
 from types import SimpleNamespace
 
@@ -10,7 +8,6 @@ import pytest
 from crash_msgs.msg import MisfitWindow, Ranking
 from crash_msgs.srv import AddEffect, GetSamples, RemoveEffect
 from helpers_diagnosis import Stage, hidden_case, joined
-from helpers_waiting import PATIENCE
 from numpy.testing import assert_allclose, assert_array_equal
 from test_constants import constants
 
@@ -281,20 +278,3 @@ def test_a_request_carries_all_that_was_found(case):
         case[1], "rate_hardening", "door_car", coefficient=1 / 3, shape={"exponent": 0.1 + 0.2}
     )  # fmt: skip
     assert with_effect(case[1], request_of(structure.effects[0])) == structure
-
-
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        ([], "parameter model is not set"),
-        (["-p", "model:=side_dumy"], "did you mean 'side_dummy'"),
-        (["-p", "model:=side_dummy", "-p", "with_bags:=['none.mcap']"], "there is no such bag"),
-        (["-p", "model:=side_dummy", "-p", "effects:=none.py"], "none.py"),
-    ],
-)
-def test_what_cannot_work_on_any_test_ends_the_node_with_one_line(arguments, complaint):
-    command = [sys.executable, "-m", "crash_estimator.nodes.diagnosis_node", "--ros-args", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
-    assert done.returncode == 1
-    lines = done.stderr.strip().splitlines()
-    assert len(lines) == 1 and lines[0].startswith("error: ") and complaint in lines[0], done.stderr

@@ -1,14 +1,10 @@
 """The estimator node says what the loop gives on the same samples, to the last bit, and tells what is wrong."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from crash_msgs.msg import Answer
 from helpers_estimation import oscillator_recording
 from helpers_estimator_node import MODEL, TIME_ZERO, assert_same, empty_samples, joined, offline
-from helpers_waiting import PATIENCE
 from numpy.testing import assert_array_equal
 
 from crash_estimator.core.methods import make_estimator
@@ -258,23 +254,3 @@ def test_parameters_that_are_not_finite_are_never_published(stage, model, record
     assert (
         "sample 100 at 5.00 ms: constrained_kalman cannot go on (the parameters are no longer" in capfd.readouterr().err
     )
-
-
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        ([], "parameter model is not set"),
-        (["-p", "model:=side_dumy"], "did you mean 'side_dummy'"),
-        (["-p", "model:=side_dummy", "-p", "method:=krls"], "parameter method must be rls, mrls"),
-        (["-p", "model:=side_dummy", "-p", "settings:=['forgetting=0.9']"], "there is no parameter settings: "),
-        (["-p", "method:=rls", "-p", "settings.forgeting:=0.9"], "did you mean settings.forgetting?"),
-        (["-p", "method:=rls", "-p", "settings.forgetting:=1.1"], "settings.forgetting must be a number from 0 to 1,"),
-        (["-p", "method:=kalman", "-p", "settings.forgetting:=0.9"], "there is no parameter settings.forgetting"),
-    ],
-)
-def test_what_cannot_work_on_any_test_ends_the_node_with_one_line(arguments, complaint):
-    command = [sys.executable, "-m", "crash_estimator.nodes.estimator_node", "--ros-args", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
-    assert done.returncode == 1
-    lines = done.stderr.strip().splitlines()
-    assert len(lines) == 1 and lines[0].startswith("error: ") and complaint in lines[0], done.stderr

@@ -2,8 +2,6 @@
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,13 +12,13 @@ from crash_msgs.msg import Attendance as Word
 from crash_msgs.msg import Ranking, ReplayState
 from crash_msgs.srv import Step
 from helpers_record import Estimator, Record, messages, says_of_itself
-from helpers_replay import Listener, Replay, environment, wait_until
+from helpers_replay import Listener, Replay, wait_until
 from helpers_waiting import PATIENCE
 
 from crash_replay.bag import read_bag
 from crash_replay.processes import this_host
 from crash_replay.qos import SAID
-from crash_replay.record_node import RecordError, opened
+from crash_replay.record_node import RecordError, main, opened
 
 
 @pytest.mark.parametrize(
@@ -51,13 +49,11 @@ def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path, monkeypatch,
         (["to:=e.mcap", "regex:='('"], "parameter regex must be a regular expression, got '('"),
     ],
 )
-def test_what_is_wrong_is_said_in_one_line(tmp_path, parameters, said):
-    command = [sys.executable, "-m", "crash_replay.record_node", "--ros-args"]
-    for parameter in parameters:
-        command += ["-p", parameter]
-    ended = subprocess.run(command, env=environment(), cwd=tmp_path, capture_output=True, text=True, timeout=60)
-    assert (ended.returncode, ended.stdout) == (1, "")
-    assert ended.stderr.startswith("error: ") and said in ended.stderr and ended.stderr.count("\n") == 1
+def test_what_is_wrong_is_said_in_one_line(tmp_path, monkeypatch, node_ended, parameters, said):
+    monkeypatch.chdir(tmp_path)
+    status, output, errors = node_ended(main, "--ros-args", *(word for one in parameters for word in ("-p", one)))
+    assert (status, output) == (1, "")
+    assert errors.startswith("error: ") and said in errors and errors.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
 
 

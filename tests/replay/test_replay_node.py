@@ -9,7 +9,7 @@ import pytest
 from crash_msgs.msg import ReplayState
 from crash_msgs.srv import Burst, Seek, SetRate, Step
 from geometry_msgs.msg import PointStamped
-from helpers_replay import Listener, Replay, some_recording, wait_until
+from helpers_replay import Listener, Replay, as_arguments, some_recording, wait_until
 from numpy.testing import assert_array_equal
 from rcl_interfaces.srv import DescribeParameters, SetParameters
 from rclpy.parameter import Parameter
@@ -19,6 +19,7 @@ from crash_replay.bag import time_zero_ns, write_bag
 from crash_replay.player import Batch
 from crash_replay.qos import STREAM
 from crash_replay.recording import Recording
+from crash_replay.replay_node import main
 from crash_replay.replay_topics import ReplayTopics
 from crash_replay.ros_messages import channel_from_msg, channel_type, stamp_ns, test_to_msg
 
@@ -231,9 +232,8 @@ def test_a_subscriber_that_is_slow_loses_nothing(tmp_path):
         ({"bag": "BAG", "loop": "maybe"}, "parameter loop must be true or false, got 'maybe' ("),
     ],
 )
-def test_what_is_wrong_is_said_in_one_line(bag, parameters, message):
+def test_what_is_wrong_is_said_in_one_line(bag, node_ended, parameters, message):
     parameters = {name: bag if value == "BAG" else value for name, value in parameters.items()}
-    with Replay(**parameters) as replay:
-        status, output, errors = replay.end()
+    status, output, errors = node_ended(main, *as_arguments(**parameters))
     assert (status, output) == (1, "")
     assert errors.startswith(f"error: {message}") and errors.count("\n") == 1
