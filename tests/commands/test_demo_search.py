@@ -1,11 +1,15 @@
 """`demo` with its search for what is missing: the same answer from one that was stopped, none from a killed one."""
 
 import os
+import re
 import signal
 
+import pytest
 from helpers_demo import demo  # noqa: F401  the fixture
+from helpers_paths import DATA
 
 FAST = ("--no-viewer", "--rate", "0.05")
+SHOTS = [DATA / f"cyberdiver/linear_damped__15npmm_{speed}mps_025damping_trial1.csv" for speed in (4, 6)]
 
 
 def answer_in(said: str) -> list[str]:
@@ -36,3 +40,16 @@ def test_a_diagnosis_that_was_killed_gives_no_answer_and_the_last_line_says_so(d
     assert not show.left_over()
     assert show.last_line().startswith("incomplete: diagnosis has ended too early: ")
     assert "no answer of the diagnosis" in show.last_line()
+
+
+@pytest.mark.skipif(not SHOTS[0].is_file(), reason=f"no recordings in {DATA}")
+def test_the_programmed_damper_is_found_in_two_recordings_of_hardware(demo):  # noqa: F811
+    """Within 15 % of its 23.4 N s/m (the recordings' README), as in single recordings (test_diagnosis_real)."""
+    show = demo(*FAST, "--recording", str(SHOTS[0]), "--with", str(SHOTS[1]))
+    assert show.end() == 0, show.said()
+    found = re.search(r"^what it lacks: viscous_damping on spring, ([\d.]+) ± ([\d.]+) N\*s/m", show.said(), re.M)
+    assert found, show.said()
+    assert float(found.group(1)) == pytest.approx(23.4, rel=0.15)
+    assert float(found.group(2)) < 1.0, "the first alone tells it to 1.1 N s/m, both to 0.7"
+    before, after = re.search(r"^the error falls: ([\d.]+) -> ([\d.]+) g", show.said(), re.M).groups()
+    assert float(after) < 0.5 * float(before)
