@@ -137,11 +137,6 @@ def test_no_onset_is_sought_where_measured_forces_push_all_free_bodies(model, mo
     assert onset_search._Search(structure, (), {}).begins == ((onset,) if sought else ())
 
 
-def test_without_friction_none_is_named(model):
-    found = diagnose(model(AXIS), [pushed_axis(0.0)])
-    assert not any(step.effect == "coulomb_friction" for step in found.steps) or found.verdict != "effect_missing"
-
-
 def test_a_cubic_spring_of_a_shaken_body_is_named(model):
     found = diagnose(model(OSCILLATOR), [shaken(CUBIC)])
     assert found.verdict == "effect_missing", found.text
