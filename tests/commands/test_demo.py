@@ -51,7 +51,7 @@ def test_the_whole_show_without_a_screen(demo, recording):  # noqa: F811
     _every_view_has_data(show.folder / "demo.rrd", total)
     temporal = temporal_rows(show.folder / "demo.rrd")
     assert all(temporal[f"/signal/cab/model/{name}"] == total for name in ESTIMATORS)
-    _curves_can_be_seen(show.folder / "demo.rrd")
+    _curves_can_be_seen(show.folder / "demo.png", said)
 
 
 def _tables_are_those_of_the_loop(said: str, recording: Recording) -> None:
@@ -93,20 +93,14 @@ def _every_view_has_data(rrd: Path, total: int) -> None:
                 assert max(own) >= total, f"{origin}: {own} rows of {name}"
 
 
-def _curves_can_be_seen(rrd: Path) -> None:
-    """The curves' own colours in the picture of the first tab: measured in the plots, both estimators as well."""
+def _curves_can_be_seen(png: Path, said: str) -> None:
+    """The curves' own colours in its picture, of the first tab: measured in the plots, both estimators as well."""
     from PIL import Image
 
     from crash_estimator.viewer.colors import ESTIMATOR_COLORS, MEASURED
-    from crash_estimator.viewer.screenshot import ScreenshotError, screenshot
 
-    png = rrd.with_suffix(".png")
-    try:
-        screenshot(rrd, png)
-    except ScreenshotError as error:
-        if "it needs: apt install" in str(error):
-            pytest.skip(f"no picture can be drawn here: {error}")
-        raise
+    if "incomplete: no picture: " in said:
+        pytest.skip(f"no picture can be drawn here: {said.splitlines()[-1]}")
     picture = np.asarray(Image.open(png).convert("RGB")).astype(int)
     assert picture.shape == (900, 1600, 3)
     upper, lower = picture[:300], picture[500:]  # accelerations; motion and force over crush
