@@ -62,6 +62,11 @@ def said(damped):
     return answers(damped[1], damped[2])
 
 
+@pytest.fixture(scope="module")
+def offline(damped):
+    return diagnose(damped[1], [damped[2]])
+
+
 def test_before_the_last_sample_the_right_effect_is_among_the_first_three_in_most_cases():
     places = {}
     for structure, effect, seed in HIDDEN:
@@ -83,8 +88,8 @@ def test_where_nothing_is_hidden_little_is_named(structure):
     assert said.count("adequate") >= 0.8 * len(said), said
 
 
-def test_the_error_is_that_of_all_samples_and_falls_to_the_noise_with_what_was_found(damped, said):
-    last, offline = said[-1], diagnose(damped[1], [damped[2]])
+def test_the_error_is_that_of_all_samples_and_falls_to_the_noise_with_what_was_found(said, offline):
+    last = said[-1]
     assert last.found[0].type == "viscous_damping" and last.verdict == offline.verdict == "effect_missing"
     # bins and coarser curves: nearly the offline answer's numbers
     assert_allclose(last.rms.before, offline.residual_rms.before, rtol=0.05)
@@ -119,8 +124,7 @@ def test_a_misfit_is_told_before_the_test_is_as_long_as_its_window(damped, end):
     assert answer.misfit and all(0.0 <= window.start <= window.end <= end for window in answer.misfit)
 
 
-def test_the_last_one_is_the_offline_answer_itself(damped):
-    offline = diagnose(damped[1], [damped[2]])
+def test_the_last_one_is_the_offline_answer_itself(offline):
     answer = final_answer(offline)
     assert answer.final and answer.ranking == offline.ranking and answer.text == offline.text
     assert [(spec.type, spec.target) for spec in answer.found] == [(s.effect, s.target) for s in offline.steps]
@@ -224,8 +228,8 @@ def test_samples_are_kept_by_number_whatever_order_they_come_in(damped):
     assert_array_equal(kept.until(170).time_ns, recording.time_ns[:170])
 
 
-def test_the_story_tells_of_all_revisions_in_ten_lines_or_less(damped):
-    answer = final_answer(diagnose(damped[1], [damped[2]]))
+def test_the_story_tells_of_all_revisions_in_ten_lines_or_less(offline):
+    answer = final_answer(offline)
     lines = story([Told("single", answer), Told("single + something", answer)])
     assert len(lines) <= 10
     assert lines[0].startswith("single + something: effect missing: viscous_damping on ")
