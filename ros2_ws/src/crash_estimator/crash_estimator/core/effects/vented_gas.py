@@ -10,7 +10,7 @@ LEAST = 0.02
 
 SLIGHT = 1e-5
 """Overpressure from which on the flow goes with its root; below, as through any hole, with itself. With 1e-3 the
-coefficients of five looked-at cushions in quiet sensors were 3 to 12 standard deviations too small, with this 3 at most."""
+coefficients of five looked-at cushions in quiet sensors were 3 to 12 sigmas too small, with this 3 at most."""
 
 MOST_PARTS = 50
 """Of a step: as many as the fastest flow asks for, 300 1/s in steps of 0.25 ms."""
