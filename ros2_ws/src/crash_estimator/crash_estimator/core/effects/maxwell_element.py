@@ -3,8 +3,9 @@
     dF/dt = k V - F / T,      F = 0 as it begins;      F = k z,  dz/dt = V - z / T
 
 V is the rate of crush in m/s, compression positive; k in N/m, never negative, is the coefficient; the relaxation time
-T in s, the damper's constant divided by k, is found. It begins at first contact, or relaxed, where a body that was held
-is let go. Rubber mounts, foams and soft tissue do so, and a hydraulic damper on a mount that gives way. `viscous_damping` is its limit for a small T, a spring in parallel that for a large one.
+T in s, the damper's constant divided by k, is found. It begins at first contact, or relaxed, where a body that was
+held is let go. Rubber mounts, foams and soft tissue do so, and a hydraulic damper on a mount that gives way.
+`viscous_damping` is its limit for a small T, a spring in parallel that for a large one.
 
 The crush is a straight line within a step of h: z_t = a z_{t-1} + (1 - a) T / h (X_t - X_{t-1}),  a = exp(-h / T).
 """
@@ -21,9 +22,8 @@ def memory(time: np.ndarray, crush: np.ndarray, start: float, relaxation_time: f
 
     turns = np.diff(time, prepend=time[0]) / relaxation_time
     kept = np.exp(-turns)
-    by_crush = np.divide(
-        -np.expm1(-turns), turns, out=np.zeros_like(turns), where=turns > 0.0
-    )  # no time: as it was held
+    # in no time it follows nothing: it was held there
+    by_crush = np.divide(-np.expm1(-turns), turns, out=np.zeros_like(turns), where=turns > 0.0)
     return trace(np.ascontiguousarray(crush, dtype=float), float(start), kept, by_crush), kept, by_crush, by_crush
 
 

@@ -26,8 +26,8 @@ FREE, DRIVEN, FIXED = 0, 1, 2
 """How a body moves: by forces, as its channels say, or not at all. The compiled passes know these codes."""
 
 REPLACED = 1e-4
-"""Of its scale, standard deviation of a damping whose place an effect takes: as good as nothing. It stays a parameter, as
-what was found with it is gone on from. Of two looked-at dampers with valves a tenth changed nothing, ten times of it
+"""Of its scale, standard deviation of a damping whose place an effect takes: as good as nothing. It stays a parameter,
+as what was found with it is gone on from. Of two looked-at dampers with valves a tenth changed nothing, ten times of it
 the sigmas, by 1.5 and 2."""
 
 
