@@ -128,7 +128,8 @@ def _ranked(one: CandidateFit, before: Model, shown: list[CandidateFit]) -> Rank
     effect, target = addition.key
     counts = one.fit and one.gain > THRESHOLDS.gain
     fitted = [other for other in shown if other is not one and other.fit] if counts else []
-    rivals = tuple(" on ".join(other.addition.key) for other in fitted if _confounded(one, other))
+    no_noise = bool(fitted) and (before.fit.problem.noise_is_inflated or not analyse(one.fit).white)
+    rivals = tuple(" on ".join(other.addition.key) for other in fitted if _confounded(one, other, no_noise))
     if one.fit is None:
         cost = before.fit.cost
         explained = min(max(2.0 * one.gain / cost, 0.0), 1.0) if cost > 0.0 else 0.0
@@ -152,9 +153,15 @@ def _explained(before: Residuals, after: Residuals) -> float:
     return float(np.clip(1.0 - after.mean_square / before.mean_square, 0.0, 1.0))
 
 
-def _confounded(one: CandidateFit, other: CandidateFit) -> bool:
-    """Whether the recordings hardly tell two fitted candidates apart: with or without what is held against a mass."""
-    margin = max(THRESHOLDS.confounded, THRESHOLDS.form_errs * max(one.gain, other.gain))
+def _confounded(one: CandidateFit, other: CandidateFit, no_noise: bool) -> bool:
+    """Whether the recordings hardly tell two fitted candidates apart: with or without what is held against a mass.
+
+    no_noise: more than noise is left; of two laws of one element that explain nearly as much the evidence says no more
+    then of which it is, as it grows with what both explain.
+    """
+    laws = no_noise and one.addition.effect.acts_on == "element" and one.addition.target == other.addition.target
+    errs = 1.0 - THRESHOLDS.nearly_all if laws else THRESHOLDS.form_errs
+    margin = max(THRESHOLDS.confounded, errs * max(one.gain, other.gain))
     gains = [(f.gain, f.gain + odds_against(f.addition, f.fit)) for f in (one, other)]
     return any(abs(a - b) < margin for a, b in zip(*gains, strict=True))
 
