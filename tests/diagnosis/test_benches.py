@@ -56,7 +56,9 @@ def test_a_damper_with_valves_is_told_where_the_model_has_one_without():
     assert applied(mended, swung.test).elements[0].damping == Coefficient()
 
 
-def test_a_body_that_was_held_for_long_is_let_go_of_with_what_relaxes_relaxed():
+def test_a_body_that_was_held_for_long_is_let_go_of_with_what_relaxes_relaxed(monkeypatch):
+    """And as only noise is left, no sign or unit is asked after."""
+    monkeypatch.setattr(diagnosis, "wrong_description", lambda *_: pytest.fail("asked"))
     found = diagnose(undamped("constant"), [swing(0.0, damping=0.0, relaxing=(200.0, 0.03))])
     assert named(found) == {"maxwell_element": pytest.approx(200.0, rel=0.03)} and found.complete
     assert found.steps[0].shape == {"relaxation_time": pytest.approx(0.03, rel=0.03)}

@@ -109,12 +109,13 @@ def diagnose(
     with search_limit(seconds):
         begun = select_from_the_onset(structure, recordings, effects)
         stopped = search_is_over()
-    # what is stopped after so many iterations has time for that
-    wrong = "" if stopped and seconds else wrong_description(*stated, begun.path, effects)
     found = _answer(structure, begun.path, tolerance, begun.zero)
+    # what is stopped after so many iterations has time for that; where only noise is left, nothing is wrong
+    asked = found.verdict != ADEQUATE and not found.noise and not (stopped and seconds)
+    wrong = wrong_description(*stated, begun.path, effects) if asked else ""
     if begun.zero and TIME_ZERO not in [step.effect for step in found.steps]:
         begun = begun._replace(zero=None, taken=begun.zero.shifts)
-    remarks = [one for one in (faults, wrong if found.verdict != ADEQUATE else "") if one]
+    remarks = [one for one in (faults, wrong) if one]
     remarks += remarks_on(begun, found.verdict == EFFECT_MISSING, found.left)
     if stopped:
         remarks.append(f"stopped after {limit_text(seconds)}: not everything was tried{_so_far(found)}")
