@@ -7,7 +7,7 @@ import numpy as np
 from crash_replay.gravity import G
 from crash_replay.shown_units import readable
 
-from .core.diagnosis import THRESHOLDS, Diagnosis, MisfitWindow, Model, Ranked
+from .core.diagnosis import THRESHOLDS, Diagnosis, MisfitWindow, Model, Ranked, StepReport
 from .tables import table
 
 SHOWN = 8
@@ -76,7 +76,7 @@ def steps_table(found: Diagnosis) -> str:
     columns = {
         "added": [f"+ {step.name}" for step in found.steps],
         "coefficient": [f"{step.coefficient:.4g} +- {step.std:.2g} {step.unit}" for step in found.steps],
-        "with": [", ".join(f"{name} {value:.3g}" for name, value in step.shape.items()) for step in found.steps],
+        "with": [", ".join(_constants(step)) for step in found.steps],
         "evidence": [f"{step.evidence:.1f}" for step in found.steps],
         "share of force that inertias explain": [
             "; ".join(f"{name} {of['before']:.2f} -> {of['after']:.2f}" for name, of in step.force_explained.items())
@@ -85,6 +85,10 @@ def steps_table(found: Diagnosis) -> str:
     }
     said = {head: cells for head, cells in columns.items() if any(cells)}
     return table(tuple(said), list(zip(*said.values()))) if found.steps else ""
+
+
+def _constants(step: StepReport) -> list[str]:
+    return [f"{name} {value:.3g} +- {step.shape_std[name]:.2g}" for name, value in step.shape.items()]
 
 
 def constants_table(found: Diagnosis) -> str:

@@ -11,20 +11,21 @@ from ..parameterization.terms import Term
 from ..selection.thresholds import THRESHOLDS
 
 
-def std_over_forms(term: Term, found: Fit) -> float:
-    """Standard deviation of an effect's coefficient about the one found, s, over all its forms k:
+def std_over_forms(term: Term, found: Fit) -> list[float]:
+    """Standard deviations s of an effect's coefficient and of the logarithms of its shape constants about those found;
+    of a force that remembers, over all its forms k:
 
         s^2 = sum_k w_k (s_k^2 + (c_k - c)^2),      w_k the evidence of each, as a share of all
 
     a mixture's (Hoeting and others 1999, after their equation 3), about c: a gas that keeps its heat, and one that
     gives it away, follow the same motion with coefficients that differ by a third.
     """
-    fits = [found, *_in_other_forms(term, found)]
+    fits = [found, *(_in_other_forms(term, found) if term.addition.effect.remembers else ())]
     evidence = np.array([one.evidence for one in fits])
     weight = np.exp(evidence - evidence.max())
-    k = term.coefficient
-    squares = [one.covariance[k, k] + (one.theta[k] - found.theta[k]) ** 2 for one in fits]
-    return float(np.sqrt(np.average(squares, weights=weight)))
+    of = [term.coefficient, *term.shapes.values()]
+    squares = [np.diagonal(one.covariance)[of] + (one.theta[of] - found.theta[of]) ** 2 for one in fits]
+    return np.sqrt(np.average(squares, axis=0, weights=weight)).tolist()
 
 
 def _in_other_forms(term: Term, found: Fit) -> Iterator[Fit]:

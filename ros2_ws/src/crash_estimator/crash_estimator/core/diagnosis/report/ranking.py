@@ -81,6 +81,7 @@ class StepReport:
     force_explained: dict[str, dict]  # per measured force: share explained by the inertias, before and after
     form: str = ""  # as of a `Ranked`
     recording: str = ""  # likewise
+    shape_std: dict[str, float] = field(default_factory=dict)  # standard deviations of the shape constants
 
     @property
     def name(self) -> str:
@@ -173,7 +174,8 @@ def step_of(
     best = step.candidates[0]
     term = of_all.layout.term(best.addition)
     value, std, shape = stated(term, of_all)
-    std = std_over_forms(term, of_all) if best.addition.effect.remembers else std
+    stds = std_over_forms(term, of_all)
+    std = stds[0] if best.addition.effect.remembers else std
     floor = noise_floor(before.fit.layout, before.records)
     changed = best.fit if step.before.fit.problem.noise_is_inflated else after.fit
     return StepReport(
@@ -185,6 +187,7 @@ def step_of(
         force_explained=_force_explained(step.before.fit, changed),
         form=best.addition.variant,
         recording=best.addition.recording,
+        shape_std={name: value * s for (name, value), s in zip(shape.items(), stds[1:], strict=True)},
     )  # fmt: skip
 
 

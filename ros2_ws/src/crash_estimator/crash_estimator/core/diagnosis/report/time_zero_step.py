@@ -23,6 +23,7 @@ def time_zero_step(zero: TimeZero, moved: Model, free_run_rms: tuple[float, floa
     farthest = max(zero.shifts, key=lambda shift: abs(shift.seconds))
     stated, found = zero.as_stated.residuals.rms, moved.residuals.rms
     floor = noise_floor(moved.fit.layout, moved.records)
+    each = zero.shifts if len(zero.shifts) > 1 else ()
     return StepReport(
         TIME_ZERO,
         ", ".join(shift.test for shift in zero.shifts),
@@ -31,7 +32,8 @@ def time_zero_step(zero: TimeZero, moved: Model, free_run_rms: tuple[float, floa
         "s",
         zero.gain(moved),
         explained=float(np.clip(1.0 - (found / stated) ** 2, 0.0, 1.0)),
-        shape={shift.test: shift.seconds for shift in zero.shifts} if len(zero.shifts) > 1 else {},
+        shape={shift.test: shift.seconds for shift in each},
+        shape_std={shift.test: shift.std for shift in each},
         residual_rms=vars(Rms(stated, found, floor)),
         free_run_rms={"before": free_run_rms[0], "after": free_run_rms[1]},
         force_explained={},
