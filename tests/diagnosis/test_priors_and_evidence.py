@@ -12,8 +12,9 @@ from crash_estimator.core.diagnosis.output_error.laplace_evidence import log_pri
 from crash_estimator.core.diagnosis.output_error.normal_equations import Normal
 from crash_estimator.core.diagnosis.output_error.problem import embedding
 from crash_estimator.core.diagnosis.parameterization.free_curve import ROUGHNESS, Curve, adapted_roughness
-from crash_estimator.core.diagnosis.parameterization.layout import _element_link, _modes
+from crash_estimator.core.diagnosis.parameterization.layout import _element_link
 from crash_estimator.core.diagnosis.parameterization.magnitudes import Magnitudes
+from crash_estimator.core.diagnosis.parameterization.nuisances import modes
 from crash_estimator.core.diagnosis.parameterization.prior import Builder
 from crash_estimator.core.diagnosis.residuals.score_test import _statistic
 from crash_estimator.core.effects import EFFECTS
@@ -83,7 +84,7 @@ def test_the_mean_of_two_sensors_has_an_error_smaller_by_the_root_of_two():
     signal = SimpleNamespace(noise=3.0, offset_std=0.4)
     record = SimpleNamespace(at=np.arange(900), signals={"left": signal, "right": signal})
     builder = Builder()
-    found = _modes(builder, record, [(0, ("left", "right"), 12)])
+    found = modes(builder, record, [(0, ("left", "right"), 12)])
     mean, *others = [one.std for one in builder.parameters]
     assert found == {0: range(1 + len(others))} and len(others) == 12
     assert mean == pytest.approx(np.hypot(0.4, 3.0 / 30.0) / np.sqrt(2.0))

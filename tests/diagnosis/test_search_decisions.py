@@ -43,6 +43,7 @@ def test_care_is_taken_within_reach_of_noise_and_with_a_further_effect_where_mos
         def __init__(self, *given):
             self.profile = lambda: called.append("profile")
             self.from_motion = self.from_model = lambda given: None  # are done whatever is found
+            self.remembered_otherwise = lambda: None  # likewise
 
         def __getattr__(self, name):
             return lambda *given: called.append(name)

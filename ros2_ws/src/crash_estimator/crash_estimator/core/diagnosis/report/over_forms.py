@@ -20,7 +20,8 @@ def std_over_forms(term: Term, found: Fit) -> list[float]:
     a mixture's (Hoeting and others 1999, after their equation 3), about c: a gas that keeps its heat, and one that
     gives it away, follow the same motion with coefficients that differ by a third.
     """
-    fits = [found, *(_in_other_forms(term, found) if term.addition.effect.remembers else ())]
+    others = _in_other_forms(term, found) if term.addition.effect.remembers else ()
+    fits = [found, *(one for one in others if np.isfinite(one.evidence))]  # of a motion that diverges nothing is known
     evidence = np.array([one.evidence for one in fits])
     weight = np.exp(evidence - evidence.max())
     of = [term.coefficient, *term.shapes.values()]

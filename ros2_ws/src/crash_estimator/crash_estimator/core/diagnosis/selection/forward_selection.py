@@ -80,7 +80,7 @@ def _one_by_one(
         first = None
         path.append(done)
         fair = _without(model, done.best) if done.best and done.before is model else model
-        if better(fair, model):
+        if better(fair, model) and not search_is_over():
             # the candidate's fit has shown a better one of the model without it
             model, path = fair, path[:-1]
             continue
