@@ -4,11 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from crash_estimator.core.diagnosis.mechanics.driven_motion import driven_by, driven_motion
 from crash_estimator.core.diagnosis.mechanics.masses import measured_inertia
-from crash_estimator.core.diagnosis.observation.grid import DRIVEN_MODES, on_grid
+from crash_estimator.core.diagnosis.observation.grid import DRIVEN_MODES, modes_of, on_grid
 from crash_estimator.core.diagnosis.observation.tracked_motion import tracked_acceleration
 from crash_estimator.core.diagnosis.observation.trajectory import element_motion
 from crash_estimator.core.effects import EFFECTS
@@ -19,7 +19,7 @@ TIME = np.arange(400) * 1e-4
 LEFT, RIGHT = 300.0 * np.sin(120.0 * TIME), 280.0 * np.sin(120.0 * TIME + 0.1)
 ERRORS = (("channel_gain", "left"), ("channel_offset", "left"), ("channel_delay", "left"), ("channel_gain", "right"))
 FIRST_MODE = len(ERRORS)
-COSINES = on_grid(TIME, np.arange(len(TIME)))["cosines"]
+COSINES = on_grid(TIME, np.arange(len(TIME)), np.arange(DRIVEN_MODES + 1))["cosines"]
 THETA = np.concatenate([[0.05, 12.0, 3.3e-4, -0.03], np.linspace(4.0, 1.0, DRIVEN_MODES + 1)])
 
 
@@ -100,3 +100,13 @@ def test_the_acceleration_of_a_displacement_that_is_reached_anyway_is_its_own():
     v = v0 + np.concatenate([[0.0], np.cumsum(0.5 * dt * (off[1:] + off[:-1]))])
     x = x0 + 1e-3 + np.concatenate([[0.0], np.cumsum(dt * v[:-1] + dt * dt * (2.0 * off[:-1] + off[1:]) / 6.0)])
     assert abs(x[-1] - displacement(time[-1])) < 1e-5, "a start that is off by 1 mm is forgotten"
+
+
+def test_a_driving_sensor_s_noise_is_known_where_a_body_rings():
+    """A pulse is slow; what rings with 40 half periods amplifies the noise around those. A dead output says nothing."""
+    time = (np.arange(1000) + 0.5) / 1000.0
+    pulse, ringing = np.sin(np.pi * np.minimum(time / 0.3, 1.0)), np.cos(40.0 * np.pi * time)
+    ringing[:3] = np.nan
+    still = np.zeros(1000)
+    assert_array_equal(modes_of(np.column_stack([pulse, still])), np.arange(DRIVEN_MODES + 1))
+    assert_array_equal(modes_of(np.column_stack([still, ringing])), [0, 1, 2, *range(35, 45)])

@@ -5,7 +5,7 @@ A mean over a bin is a sample with less noise, at the bin's centre; what is fast
 
 import numpy as np
 
-from .grid import on_grid
+from .grid import modes_of, on_grid
 from .record import ObservedRecord, Signal
 
 STEP = 5e-4
@@ -30,7 +30,7 @@ def in_bins(record: ObservedRecord) -> ObservedRecord:
     mean = np.where(compared, measured, 0.0).sum(axis=1) / np.where(count, count, np.nan)
     grid = np.concatenate([[0.0], centre])
     coarse = record._replace(
-        **on_grid(grid, np.arange(1, bins + 1)),
+        **on_grid(grid, np.arange(1, bins + 1), modes_of(record.measured)),
         measured=mean,
         noise=record.noise / np.sqrt(per_bin),
         signals={name: _in_bins(signal, used, per_bin, grid) for name, signal in record.signals.items()},

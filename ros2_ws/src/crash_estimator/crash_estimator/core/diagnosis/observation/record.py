@@ -21,7 +21,7 @@ from ...noise_spectrum import NoiseSpectrum, seen_early
 from ...sensor_noise import sensor_noise
 from ...structure import ModelError, Structure
 from .gaps import through_gaps
-from .grid import bins_of, grid_of, on_grid
+from .grid import bins_of, grid_of, modes_of, on_grid
 from .pace import longest_step
 from .rest import Rest, bridged, rests_of, seen_early_by
 from .tracked_motion import tracked_acceleration
@@ -241,7 +241,7 @@ def observe(structure: Structure, recording: Recording, rest: Rest | None = None
     )
     return ObservedRecord(
         test=recording.test,
-        **on_grid(time, at),
+        **on_grid(time, at, modes_of(measured)),
         measured=measured,
         noise=np.array([spectrum.std for spectrum in spectra]),
         spectra=tuple(spectra),

@@ -53,7 +53,7 @@ def _bounded(b: Builder, name: str, std: float) -> int:
 
 
 def modes(b: Builder, record: ObservedRecord, by: Iterable[tuple[int, Sequence[str], int]]) -> dict[int, range]:
-    """Mean and so many slow cosines of the noise of channels whose mean moves or pushes a body: white noise spreads its
+    """Mean and so many cosines of the noise of channels whose mean moves or pushes a body: white noise spreads its
     variance evenly over them. Where there are none a force's zero errs as its rest says: with the noise's own mean the
     friction of an axis, recorded for 25 s, was told as 17.5 N for 20.4."""
     found, samples = {}, len(record.at)
