@@ -13,6 +13,7 @@ from crash_estimator.core.diagnosis.report import diagnosis
 from crash_estimator.core.diagnosis.report.verdict import Verdict
 from crash_estimator.core.effects.applied import applied
 from crash_estimator.core.structure import Body, Coefficient, Element, Structure
+from crash_estimator.diagnosis_tables import steps_table
 from crash_replay.gravity import G
 from crash_replay.recording import Channel, Recording, Test
 
@@ -61,7 +62,10 @@ def test_a_body_that_was_held_for_long_is_let_go_of_with_what_relaxes_relaxed(mo
     monkeypatch.setattr(diagnosis, "wrong_description", lambda *_: pytest.fail("asked"))
     found = diagnose(undamped("constant"), [swing(0.0, damping=0.0, relaxing=(200.0, 0.03))])
     assert named(found) == {"maxwell_element": pytest.approx(200.0, rel=0.03)} and found.complete
-    assert found.steps[0].shape == {"relaxation_time": pytest.approx(0.03, rel=0.03)}
+    (step,) = found.steps
+    assert step.shape == {"relaxation_time": pytest.approx(0.03, rel=0.03)}
+    assert abs(step.shape["relaxation_time"] - 0.03) < 4.0 * step.shape_std["relaxation_time"] < 0.003
+    assert f"relaxation_time 0.03 +- {step.shape_std['relaxation_time']:.2g}" in steps_table(found)
 
 
 def undamped(shape: str) -> Structure:
